@@ -1,0 +1,59 @@
+"""The nouns of Glisson: plain, frozen, validated types that the components exchange."""
+
+from glisson.core.deformation import ContactReport, Deformation, Event, LoadStep, StageResult
+from glisson.core.errors import BadInput, GlissonError, StageFailed
+from glisson.core.guidance import (
+    CrossedVessel,
+    Guidance,
+    PlaneGuidance,
+    TumourGuidance,
+    VolumeGuidance,
+    WireGuidance,
+)
+from glisson.core.image import Grid, LabelMap, Volume
+from glisson.core.mesh import TetMesh, TriangleSurface
+from glisson.core.model import Material, Model
+from glisson.core.observations import Observation, Observations
+from glisson.core.scenario import Board, ContactLaw, Lever, LeverDrive, Scenario, Stage
+from glisson.core.status import Status
+from glisson.core.structures import Curve, Plane, Structures, Tumour, VesselTree
+from glisson.core.transform import RigidTransform
+
+__all__ = [
+    "BadInput",
+    "Board",
+    "ContactLaw",
+    "ContactReport",
+    "CrossedVessel",
+    "Curve",
+    "Deformation",
+    "Event",
+    "GlissonError",
+    "Grid",
+    "Guidance",
+    "LabelMap",
+    "Lever",
+    "LeverDrive",
+    "LoadStep",
+    "Material",
+    "Model",
+    "Observation",
+    "Observations",
+    "Plane",
+    "PlaneGuidance",
+    "RigidTransform",
+    "Scenario",
+    "Stage",
+    "StageFailed",
+    "StageResult",
+    "Status",
+    "Structures",
+    "TetMesh",
+    "TriangleSurface",
+    "Tumour",
+    "TumourGuidance",
+    "VesselTree",
+    "Volume",
+    "VolumeGuidance",
+    "WireGuidance",
+]

@@ -1,0 +1,86 @@
+"""The organ's mechanical model: mesh, materials, what holds it, and what is embedded in it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+
+from glisson.core.arrays import IntArray, check_range, frozen_ints
+from glisson.core.errors import BadInput
+from glisson.core.mesh import TetMesh
+from glisson.core.structures import Structures
+
+
+@dataclass(frozen=True)
+class Material:
+    """Elastic material of one region. `law` names a material technique (for example "neo-hookean")."""
+
+    law: str
+    young_modulus_kpa: float
+    poisson_ratio: float
+    density_kg_m3: float = 1150.0
+
+    def __post_init__(self) -> None:
+        if not self.young_modulus_kpa > 0.0 or not np.isfinite(self.young_modulus_kpa):
+            raise BadInput(f"Young's modulus must be positive, not {self.young_modulus_kpa} kPa.")
+        if not -1.0 < self.poisson_ratio < 0.5:
+            raise BadInput(
+                f"Poisson's ratio must lie above -1 and below 0.5, not {self.poisson_ratio}; "
+                "for nearly incompressible tissue use 0.45 to 0.499."
+            )
+        if not 0.0 <= self.density_kg_m3 < 30_000.0:
+            raise BadInput(f"Density must lie between 0 and 30000 kg/m³, not {self.density_kg_m3}.")
+
+    @property
+    def shear_modulus_kpa(self) -> float:
+        """µ = E / (2 (1 + ν))."""
+        return self.young_modulus_kpa / (2.0 * (1.0 + self.poisson_ratio))
+
+    @property
+    def bulk_modulus_kpa(self) -> float:
+        """κ = E / (3 (1 − 2ν))."""
+        return self.young_modulus_kpa / (3.0 * (1.0 - 2.0 * self.poisson_ratio))
+
+    @property
+    def lame_lambda_kpa(self) -> float:
+        """λ = κ − 2µ/3."""
+        return self.bulk_modulus_kpa - 2.0 / 3.0 * self.shear_modulus_kpa
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """What the scan says of the organ, in its scanned shape A.
+
+    `materials` maps region numbers of the mesh to materials, `region_names` to names for people,
+    `node_sets` names to node numbers (attachments such as "back").
+    """
+
+    mesh: TetMesh
+    materials: Mapping[int, Material]
+    region_names: Mapping[int, str]
+    node_sets: Mapping[str, IntArray]
+    structures: Structures = field(default_factory=Structures)
+
+    def __post_init__(self) -> None:
+        present = {int(n) for n in np.unique(self.mesh.region_numbers)}
+        missing = present - set(self.materials)
+        if missing:
+            raise BadInput(f"Mesh regions {sorted(missing)} have no material.")
+        sets = {}
+        for name, nodes in self.node_sets.items():
+            sets[name] = frozen_ints(nodes, (None,), f"node set {name}")
+            check_range(sets[name], len(self.mesh.nodes), f"Node set {name}")
+        object.__setattr__(self, "materials", MappingProxyType(dict(self.materials)))
+        object.__setattr__(self, "region_names", MappingProxyType(dict(self.region_names)))
+        object.__setattr__(self, "node_sets", MappingProxyType(sets))
+
+    def node_set(self, name: str) -> IntArray:
+        """Node numbers of a named set.
+
+        Raises:
+            BadInput: there is no such set.
+        """
+        if name not in self.node_sets:
+            raise BadInput(f"The model has no node set {name!r}; it has {sorted(self.node_sets)}.")
+        return self.node_sets[name]

@@ -1,0 +1,131 @@
+"""The seams: one protocol per kind of technique.
+
+A technique is a small class with a `name`, a frozen dataclass of `Parameters` and one method that does
+the work. It is found through an entry point of its kind's group (`glisson.segmenters` and so on), so a
+lab adds its own from a package of its own. Long work calls `progress` now and then; Ctrl-C arrives as
+KeyboardInterrupt and must not be swallowed.
+"""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from glisson.core.arrays import FloatArray
+from glisson.core.deformation import Deformation
+from glisson.core.image import LabelMap, Volume
+from glisson.core.mesh import TetMesh, TriangleSurface
+from glisson.core.model import Model
+from glisson.core.observations import Observations
+from glisson.core.scenario import Scenario
+from glisson.core.transform import RigidTransform
+
+
+class Progress(Protocol):
+    """Told how far work is: `fraction` in 0 to 1 (None: unknown) and a few words."""
+
+    def __call__(self, fraction: float | None, message: str) -> None:
+        """Report."""
+
+
+def silent(fraction: float | None, message: str) -> None:
+    """A `Progress` that says nothing."""
+
+
+@runtime_checkable
+class Technique(Protocol):
+    """What all techniques share."""
+
+    name: ClassVar[str]
+    summary: ClassVar[str]
+    Parameters: ClassVar[type[Any]]
+
+    def __init__(self, parameters: Any) -> None:
+        """Take validated parameters, an instance of `Parameters`."""
+
+    @classmethod
+    def missing_dependencies(cls) -> tuple[str, ...]:
+        """Packages or programs that are needed and absent, as one would install them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Segmentation:
+    """Labels found, with the axial slices k that a person should look at and why."""
+
+    labels: LabelMap
+    flagged_slices: tuple[tuple[int, str], ...] = ()
+
+
+class Segmenter(Technique, Protocol):
+    """Finds the organ in a scan (entry-point group `glisson.segmenters`)."""
+
+    def segment(
+        self, volume: Volume, labels: LabelMap | None, seeds_mm: FloatArray, progress: Progress = silent
+    ) -> Segmentation:
+        """Segment.
+
+        Args:
+            volume: the scan.
+            labels: what is known already (tumours of another tool, for example), on the same grid.
+            seeds_mm: clicks inside the organ, (n, 3) LPS mm; may be empty.
+            progress: told how far it is.
+
+        Raises:
+            BadInput: the technique needs something that was not given.
+            StageFailed: nothing was found.
+        """
+
+
+class SurfaceExtractor(Technique, Protocol):
+    """Makes a closed surface of a mask (entry-point group `glisson.surface_extractors`)."""
+
+    def extract(self, mask: NDArray[np.bool_], labels: LabelMap) -> TriangleSurface:
+        """Closed surface in LPS mm of a boolean mask on the grid of `labels`."""
+
+
+class Mesher(Technique, Protocol):
+    """Fills a closed surface with tetrahedra (entry-point group `glisson.meshers`)."""
+
+    def mesh(self, surface: TriangleSurface, progress: Progress = silent) -> TetMesh:
+        """T4 mesh of the inside.
+
+        Raises:
+            StageFailed: no mesh could be made.
+        """
+
+
+class MaterialLaw(Technique, Protocol):
+    """A hyperelastic law (entry-point group `glisson.materials`); see `glisson.mechanics.materials`."""
+
+
+class Solver(Technique, Protocol):
+    """Computes what a scenario does to a model (entry-point group `glisson.solvers`)."""
+
+    def solve(self, model: Model, scenario: Scenario, progress: Progress = silent) -> Deformation:
+        """Deformation through all stages; a solve that fails is told by its status, not by an exception."""
+
+
+class Registration(Technique, Protocol):
+    """Deforms a model to fit what was seen (entry-point group `glisson.registrations`)."""
+
+    def register(self, model: Model, observations: Observations, progress: Progress = silent) -> Deformation:
+        """Deformation that explains the observations; unobservable or ambiguous is told by its status."""
+
+
+class SurfaceReconstructor(Technique, Protocol):
+    """Makes surface points of laparoscope views (entry-point group `glisson.surface_reconstructors`)."""
+
+    def reconstruct(self, images: tuple[NDArray[np.uint8], ...], poses: tuple[RigidTransform, ...]) -> Observations:
+        """Points with covariance from images (h, w, 3) and the scope poses `room_from_camera`."""
+
+
+class Localiser(Technique, Protocol):
+    """Finds the pose of a camera or tool (entry-point group `glisson.localisers`)."""
+
+    def localise(self, image: NDArray[np.uint8]) -> RigidTransform:
+        """Pose with covariance from an image (h, w, 3).
+
+        Raises:
+            StageFailed: no pose, or an ambiguous one.
+        """

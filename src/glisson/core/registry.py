@@ -1,0 +1,98 @@
+"""Finds techniques by entry point, so that a lab adds its own without touching this package.
+
+It lives in `core` because `mechanics` looks up material laws and must not import `framework`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
+
+from glisson.core.errors import BadInput
+from glisson.core.parameters import build_parameters
+
+KINDS = {
+    "segmenter": "glisson.segmenters",
+    "surface-extractor": "glisson.surface_extractors",
+    "mesher": "glisson.meshers",
+    "material": "glisson.materials",
+    "solver": "glisson.solvers",
+    "registration": "glisson.registrations",
+    "surface-reconstructor": "glisson.surface_reconstructors",
+    "localiser": "glisson.localisers",
+}
+"""Kind of technique → entry-point group."""
+
+
+@dataclass(frozen=True)
+class Listing:
+    """A technique as `glisson techniques` shows it; `broken` is why it could not be loaded."""
+
+    kind: str
+    name: str
+    package: str
+    summary: str
+    missing: tuple[str, ...]
+    broken: str | None = None
+
+    @property
+    def is_available(self) -> bool:
+        """Whether it can be used now."""
+        return not self.missing and self.broken is None
+
+
+def technique_class(kind: str, name: str) -> Any:
+    """The class of a technique, checked to be usable.
+
+    Raises:
+        BadInput: unknown kind or name, two packages offering the same name, a package that does not
+            load, or dependencies that are missing (the sentence says what to install).
+    """
+    found = [point for point in _points(kind) if point.name == name]
+    if not found:
+        known = sorted({point.name for point in _points(kind)})
+        raise BadInput(f"There is no {kind} technique {name!r}; known are {known}.")
+    if len(found) > 1:
+        packages = sorted(_package(point) for point in found)
+        raise BadInput(f"The {kind} technique {name!r} is offered by {packages}; uninstall all but one.")
+    try:
+        loaded = found[0].load()
+    except Exception as error:  # a plug-in may fail in any way while it is imported
+        raise BadInput(f"The {kind} technique {name!r} of {_package(found[0])} does not load: {error}.") from error
+    missing = loaded.missing_dependencies()
+    if missing:
+        raise BadInput(f"The {kind} technique {name!r} needs {', '.join(missing)}; install them first.")
+    return loaded
+
+
+def make_technique(kind: str, name: str, values: Mapping[str, Any], where: str) -> Any:
+    """A technique with parameters built from `values` (a TOML table or CLI options).
+
+    Raises:
+        BadInput: as `technique_class`, or a parameter is unknown or out of range.
+    """
+    made = technique_class(kind, name)
+    return made(build_parameters(made.Parameters, values, where))
+
+
+def list_techniques() -> tuple[Listing, ...]:
+    """Every technique of every kind, the broken ones with the reason."""
+    return tuple(_listing(kind, point) for kind in KINDS for point in sorted(_points(kind), key=lambda p: p.name))
+
+
+def _listing(kind: str, point: EntryPoint) -> Listing:
+    try:
+        loaded = point.load()
+        return Listing(kind, point.name, _package(point), loaded.summary, tuple(loaded.missing_dependencies()))
+    except Exception as error:  # a plug-in may fail in any way while it is imported
+        return Listing(kind, point.name, _package(point), "", (), f"{type(error).__name__}: {error}")
+
+
+def _points(kind: str) -> tuple[EntryPoint, ...]:
+    if kind not in KINDS:
+        raise BadInput(f"There is no kind of technique {kind!r}; known are {sorted(KINDS)}.")
+    return tuple(entry_points(group=KINDS[kind]))
+
+
+def _package(point: EntryPoint) -> str:
+    return point.dist.name if point.dist is not None else "an unknown package"
