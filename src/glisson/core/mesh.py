@@ -38,7 +38,7 @@ class TriangleSurface:
         edges = self.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
         keys = edges[:, 0] * len(self.vertices) + edges[:, 1]
         back = edges[:, 1] * len(self.vertices) + edges[:, 0]
-        return bool(len(np.unique(keys)) == len(keys) and np.isin(back, keys).all())
+        return len(np.unique(keys)) == len(keys) and bool(np.all(np.isin(back, keys)))
 
     @property
     def volume_mm3(self) -> float:
