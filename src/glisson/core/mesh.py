@@ -38,7 +38,8 @@ class TriangleSurface:
         edges = self.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
         keys = edges[:, 0] * len(self.vertices) + edges[:, 1]
         back = edges[:, 1] * len(self.vertices) + edges[:, 0]
-        return len(np.unique(keys)) == len(keys) and bool(np.all(np.isin(back, keys)))
+        forward = set(keys.tolist())
+        return len(forward) == len(keys) and set(back.tolist()) <= forward
 
     @property
     def volume_mm3(self) -> float:
@@ -87,7 +88,7 @@ class TetMesh:
     @property
     def is_quadratic(self) -> bool:
         """Whether elements are T10."""
-        return self.tetrahedra.shape[1] == 10
+        return bool(self.tetrahedra.shape[1] == 10)
 
     @property
     def region_numbers(self) -> IntArray:
