@@ -2,10 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import MISSING, Field, field, fields
+from math import isfinite
 from types import UnionType
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
-
-import numpy as np
 
 from glisson.core.errors import BadInput
 
@@ -49,30 +48,42 @@ def _checked(item: "Field[Any]", hint: Any, value: Any, where: str) -> Any:
     plain = next(k for k in kinds if k is not type(None))
     try:
         converted = _converted(plain, value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise BadInput(f"{where}: {item.name} must be {_kind_name(plain)}, not {value!r}.") from None
     low, high = item.metadata.get("minimum"), item.metadata.get("maximum")
-    if isinstance(converted, (int, float)) and not isinstance(converted, bool):
-        outside = (low is not None and converted < low) or (high is not None and converted > high)
-        if outside or not np.isfinite(converted):
-            raise BadInput(f"{where}: {item.name} must lie between {low} and {high}, not {converted}.")
+    for number in converted if isinstance(converted, tuple) else (converted,):
+        if isinstance(number, (int, float)) and not isinstance(number, bool) and _is_outside(number, low, high):
+            raise BadInput(f"{where}: {item.name} must {range_phrase(low, high)}, not {number}.")
     choices = item.metadata.get("choices", ())
     if choices and converted not in choices:
         raise BadInput(f"{where}: {item.name} must be one of {list(choices)}, not {converted!r}.")
     return converted
 
 
+def range_phrase(minimum: float | None, maximum: float | None) -> str:
+    """The allowed range in words, to follow "must": "lie between 0 and 1", "be at least 0", "be finite"."""
+    if minimum is not None and maximum is not None:
+        return f"lie between {minimum:g} and {maximum:g}"
+    if minimum is not None:
+        return f"be at least {minimum:g}"
+    return "be finite" if maximum is None else f"be at most {maximum:g}"
+
+
+def _is_outside(number: float, low: float | None, high: float | None) -> bool:
+    return not isfinite(number) or (low is not None and number < low) or (high is not None and number > high)
+
+
 def _converted(kind: Any, value: Any) -> Any:
     if get_origin(kind) is tuple:
-        inner = get_args(kind)[0]
-        if isinstance(value, str):
+        inner, *rest = get_args(kind)
+        if isinstance(value, str) or (rest != [Ellipsis] and len(value) != 1 + len(rest)):
             raise TypeError
         return tuple(_converted(inner, entry) for entry in value)
     if kind is bool:
         if not isinstance(value, bool):
             raise TypeError
         return value
-    if kind is int and (isinstance(value, bool) or int(value) != float(value)):
+    if isinstance(value, bool) or (kind is int and int(value) != float(value)):
         raise TypeError
     if kind is str and not isinstance(value, str):
         raise TypeError
@@ -81,5 +92,7 @@ def _converted(kind: Any, value: Any) -> Any:
 
 def _kind_name(kind: Any) -> str:
     if get_origin(kind) is tuple:
-        return "a list"
+        inner, *rest = get_args(kind)
+        length = "" if rest == [Ellipsis] else f" of {1 + len(rest)} entries"
+        return f"a list{length}, each {_kind_name(inner)}"
     return {int: "a whole number", float: "a number", bool: "true or false", str: "a text"}.get(kind, str(kind))

@@ -4,7 +4,7 @@ It lives in `core` because `mechanics` looks up material laws and must not impor
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
@@ -56,10 +56,9 @@ def technique_class(kind: str, name: str) -> Any:
         packages = sorted(_package(point) for point in found)
         raise BadInput(f"The {kind} technique {name!r} is offered by {packages}; uninstall all but one.")
     try:
-        loaded = found[0].load()
+        loaded, missing = _loaded(found[0])
     except Exception as error:  # a plug-in may fail in any way while it is imported
         raise BadInput(f"The {kind} technique {name!r} of {_package(found[0])} does not load: {error}.") from error
-    missing = loaded.missing_dependencies()
     if missing:
         raise BadInput(f"The {kind} technique {name!r} needs {', '.join(missing)}; install them first.")
     return loaded
@@ -82,10 +81,20 @@ def list_techniques() -> tuple[Listing, ...]:
 
 def _listing(kind: str, point: EntryPoint) -> Listing:
     try:
-        loaded = point.load()
-        return Listing(kind, point.name, _package(point), loaded.summary, tuple(loaded.missing_dependencies()))
+        loaded, missing = _loaded(point)
+        return Listing(kind, point.name, _package(point), loaded.summary, missing)
     except Exception as error:  # a plug-in may fail in any way while it is imported
         return Listing(kind, point.name, _package(point), "", (), f"{type(error).__name__}: {error}")
+
+
+def _loaded(point: EntryPoint) -> tuple[Any, tuple[str, ...]]:
+    """The class behind an entry point, checked to be a technique, and what it misses."""
+    loaded = point.load()
+    if not is_dataclass(getattr(loaded, "Parameters", None)):
+        raise TypeError("it has no dataclass Parameters, see glisson.core.protocols.Technique")
+    if not isinstance(getattr(loaded, "summary", None), str) or getattr(loaded, "name", None) != point.name:
+        raise TypeError(f"it needs a summary and the name {point.name!r} under which it is registered")
+    return loaded, tuple(loaded.missing_dependencies())
 
 
 def _points(kind: str) -> tuple[EntryPoint, ...]:
