@@ -1,0 +1,1 @@
+"""What several components need of geometry: location, mapping, distance, cutting, planes (mm, LPS)."""

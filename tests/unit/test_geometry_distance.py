@@ -1,0 +1,42 @@
+import numpy as np
+import pytest
+import trimesh
+from blocks import block, sphere
+
+from glisson.core import BadInput, TriangleSurface
+from glisson.geometry.distance import closest_points, inside
+
+SIZE = np.array([30.0, 20.0, 10.0])
+
+
+def test_distance_to_a_box_is_the_closed_form():
+    surface = block((3, 2, 1), tuple(SIZE)).surface()
+    points = np.random.default_rng(2).uniform(-10.0, 40.0, (3000, 3))
+    distance, closest = closest_points(points, surface)
+    nearest = np.clip(points, 0.0, SIZE)
+    outside = np.linalg.norm(points - nearest, axis=1)
+    within = np.minimum(points, SIZE - points).min(axis=1)
+    np.testing.assert_allclose(distance, np.where(within > 0.0, within, outside), atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(points - closest, axis=1), distance, atol=1e-12)
+
+
+def test_inside_a_box_with_rays_through_its_edges_and_corners():
+    surface = block((3, 2, 1), tuple(SIZE)).surface()
+    grid = np.stack(np.meshgrid(*[np.arange(-5.0, 36.0, 2.5)] * 3), axis=-1).reshape(-1, 3)  # meets vertices and edges
+    clear = np.abs(np.concatenate([grid, grid - SIZE], axis=1)).min(axis=1) > 0.0
+    expected = np.all((grid > 0.0) & (grid < SIZE), axis=1)
+    assert np.array_equal(inside(grid, surface)[clear], expected[clear])
+
+
+def test_inside_agrees_with_another_library():
+    surface = sphere([1.0, 2.0, 3.0], 10.0, level=3)
+    points = np.random.default_rng(3).uniform(-12.0, 15.0, (2000, 3))
+    other = trimesh.Trimesh(surface.vertices, surface.triangles, process=False)
+    assert np.array_equal(inside(points, surface), other.contains(points))
+
+
+def test_an_open_surface_has_no_inside():
+    with pytest.raises(BadInput, match="closed"):
+        inside([[0.0, 0.0, 0.0]], TriangleSurface(np.eye(3), [[0, 1, 2]]))
+    with pytest.raises(BadInput, match="without triangles"):
+        closest_points([[0.0, 0.0, 0.0]], TriangleSurface(np.eye(3), np.zeros((0, 3))))
