@@ -1,0 +1,1 @@
+"""Files in and out: images, labels, meshes, scenarios and results; every file is guarded before it is decoded."""

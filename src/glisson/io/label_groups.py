@@ -1,0 +1,92 @@
+"""The three label maps of a case: the whole organ, its tumours, and the other structures.
+
+Structures overlap (a liver mask contains its tumours and vessels), so one map cannot hold them all.
+"""
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from glisson.core import BadInput, Grid, LabelMap, Volume
+from glisson.io.stored_image import whole_type
+
+_TUMOUR = re.compile(r"^tumour(\d+)$")
+
+
+def group_labels(maps: Sequence[LabelMap]) -> dict[str, LabelMap]:
+    """Sort masks by their canonical names into "organ", "tumours" and "structures"; empty groups are left out.
+
+    "organ" is the liver with its tumours, label 1. Tumours are numbered by their names. Where structures
+    overlap, the smaller one keeps the voxels, since it would vanish otherwise. Of two maps that name the
+    same structure the voxels are united.
+
+    Raises:
+        BadInput: the maps lie on different grids.
+    """
+    masks: dict[str, NDArray[np.bool_]] = {}
+    for labels in maps:
+        require_same_grid(maps[0], labels, "a label map")
+        for name in labels.names.values():
+            mask = labels.mask(name)
+            if mask.any():
+                masks[name] = masks[name] | mask if name in masks else mask
+    if not masks:
+        return {}
+    grid = maps[0].grid
+    tumours = sorted((name for name in masks if _TUMOUR.match(name)), key=_tumour_number)
+    others = [name for name in masks if name != "liver" and name not in tumours]
+    groups = {}
+    if "liver" in masks:
+        organ = np.logical_or.reduce([masks["liver"], *(masks[name] for name in tumours)])
+        groups["organ"] = LabelMap(organ.astype(np.uint8), grid, {1: "liver"})
+    if tumours:
+        groups["tumours"] = _stacked({name: masks[name] for name in tumours}, grid)
+    if others:
+        groups["structures"] = _stacked({name: masks[name] for name in others}, grid)
+    return groups
+
+
+def require_same_grid(reference: Volume | LabelMap | Grid, other: Volume | LabelMap | Grid, what: str) -> None:
+    """Refuse an image that does not lie voxel on voxel with the reference.
+
+    Args:
+        reference: the scan, usually.
+        other: what must lie on its grid.
+        what: the other's name for the sentence ("the label map liver.nii.gz").
+
+    Raises:
+        BadInput: the grids differ; both are described.
+    """
+    wanted = reference if isinstance(reference, Grid) else reference.grid
+    found = other if isinstance(other, Grid) else other.grid
+    if not wanted.matches(found):
+        raise BadInput(
+            f"{what[:1].upper()}{what[1:]} lies on another grid than the scan: {_described(found)}, but the scan has "
+            f"{_described(wanted)}; resample it onto the scan's grid with nearest neighbours."
+        )
+
+
+def _stacked(masks: dict[str, NDArray[np.bool_]], grid: Grid) -> LabelMap:
+    numbers = {name: number for number, name in enumerate(masks, start=1)}
+    voxels: NDArray[Any] = np.zeros(grid.shape, dtype=whole_type(0, len(masks)))
+    for name in sorted(masks, key=lambda name: -int(masks[name].sum())):
+        voxels[masks[name]] = numbers[name]
+    return LabelMap(voxels, grid, {number: name for name, number in numbers.items()})
+
+
+def _tumour_number(name: str) -> int:
+    match = _TUMOUR.match(name)
+    assert match is not None  # only names that matched are sorted
+    return int(match.group(1))
+
+
+def _described(grid: Grid) -> str:
+    spacing = " × ".join(f"{value:.4g}" for value in grid.spacing_mm)
+    origin = ", ".join(f"{value:.2f}" for value in grid.origin_mm)
+    turned = (
+        "" if np.allclose(grid.direction, np.eye(3), atol=1e-4) else f", axes {np.round(grid.direction, 3).tolist()}"
+    )
+    return f"{' × '.join(map(str, grid.shape))} voxels of {spacing} mm from ({origin}){turned}"
