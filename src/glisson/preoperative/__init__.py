@@ -1,0 +1,1 @@
+"""From the scan to a patient's model: segmentation, surface, tetrahedra, structures, attachments."""
