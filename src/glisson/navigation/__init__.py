@@ -1,0 +1,1 @@
+"""What the deformation means to the surgeon: tumours, resection planes, volumes, vessels, wire, report."""

@@ -1,0 +1,100 @@
+"""The guide wire: a curve of fixed length in the bile duct, measured from the duct's mouth inward."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from glisson.core.arrays import FloatArray
+from glisson.core.structures import Curve
+from glisson.geometry.mapping import PointMap
+
+CHORD_MM = 3.0
+"""Half the chord whose direction stands for the tangent: it evens out voxel steps of a traced wire, and
+the chord of a circle is parallel to the tangent at its middle."""
+
+_EXTENSION_MM = 1000.0
+_STEP_MM = 1.0
+
+
+class Wire:
+    """A curve by arc length (mm) from the mouth, going on straight along its end tangents.
+
+    Negative arc lengths lie before the mouth, those beyond `length_mm` behind the tip.
+    """
+
+    def __init__(self, points_mm: FloatArray, length_mm: float) -> None:
+        """The first `length_mm` of the polyline (n, 3); extended by its end tangent where it is shorter."""
+        whole = Curve(points_mm)
+        self.length_mm = float(length_mm)
+        start, end = _end_tangents(whole)
+        arcs = np.concatenate([[-_EXTENSION_MM], whole.arc_lengths_mm, [whole.length_mm + _EXTENSION_MM]])
+        first, last = whole.points_mm[0], whole.points_mm[-1]
+        rows = np.vstack([first - _EXTENSION_MM * start, whole.points_mm, last + _EXTENSION_MM * end])
+        if length_mm < whole.length_mm:
+            inner = arcs < length_mm
+            tip = _at(arcs, rows, np.array([length_mm]))
+            cut = Curve(np.vstack([rows[1:][inner[1:]], tip]))
+            end = _end_tangents(cut)[1]
+            arcs = np.concatenate([arcs[inner], [length_mm, length_mm + _EXTENSION_MM]])
+            rows = np.vstack([rows[inner], tip, tip + _EXTENSION_MM * end])
+        self._arcs, self._rows = arcs, rows
+
+    @property
+    def points_mm(self) -> FloatArray:
+        """The wire from mouth to tip as a polyline (n, 3)."""
+        inner = (self._arcs > 0.0) & (self._arcs < self.length_mm)
+        return np.vstack([self.at(0.0), self._rows[inner], self.at(self.length_mm)])
+
+    def at(self, arc_mm: ArrayLike) -> FloatArray:
+        """Points (n, 3) at arc lengths (n,)."""
+        return _at(self._arcs, self._rows, np.atleast_1d(np.asarray(arc_mm, dtype=np.float64)))
+
+    def tangent(self, arc_mm: float) -> FloatArray:
+        """Unit tangent (3,) pointing inward at an arc length: the chord over ± `CHORD_MM`."""
+        chord = self.at(arc_mm + CHORD_MM)[0] - self.at(arc_mm - CHORD_MM)[0]
+        direction: FloatArray = chord / np.linalg.norm(chord)
+        return direction
+
+    def project(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Arc length (n,) of the extended wire's point nearest to each of (n, 3), and the distance (n,)."""
+        arcs, least = np.zeros(len(points_mm)), np.full(len(points_mm), np.inf)
+        for segment, (start, step) in enumerate(zip(self._rows[:-1], np.diff(self._rows, axis=0), strict=True)):
+            offset = points_mm - start
+            share = np.clip(offset @ step / (step @ step), 0.0, 1.0)
+            distance = np.linalg.norm(offset - share[:, None] * step, axis=1)
+            nearer = distance < least
+            length = self._arcs[segment + 1] - self._arcs[segment]
+            arcs[nearer] = self._arcs[segment] + share[nearer] * length
+            least = np.minimum(least, distance)
+        return arcs, least
+
+
+def carried_wire(duct: Curve, length_mm: float, point_map: PointMap) -> tuple[Wire, float]:
+    """The wire in B and its slide in mm.
+
+    The wire keeps its length and is held at the duct's mouth, so it fills the first `length_mm` of the
+    deformed duct. The slide is its tip's motion past the tissue, *positive inward*: what the duct between
+    the mouth and the tip's material point of A has shortened.
+    """
+    in_a = Wire(duct.points_mm, max(duct.length_mm, length_mm))
+    whole = float(in_a.length_mm)
+    arcs = np.unique(np.concatenate([_ladder(whole), duct.arc_lengths_mm, [length_mm]]))
+    carried = Curve(point_map.forward(in_a.at(arcs)))
+    slide = length_mm - float(carried.arc_lengths_mm[np.searchsorted(arcs, length_mm)])
+    return Wire(carried.points_mm, length_mm), slide
+
+
+def _ladder(length_mm: float) -> FloatArray:
+    return np.linspace(0.0, length_mm, max(2, int(np.ceil(length_mm / _STEP_MM)) + 1))
+
+
+def _at(arcs: FloatArray, rows: FloatArray, where: FloatArray) -> FloatArray:
+    return np.stack([np.interp(where, arcs, rows[:, axis]) for axis in range(3)], axis=1)
+
+
+def _end_tangents(curve: Curve) -> tuple[FloatArray, FloatArray]:
+    """Unit chords (3,), (3,) over the first and the last `CHORD_MM`, both pointing inward."""
+    arcs, reach = curve.arc_lengths_mm, min(CHORD_MM, curve.length_mm)
+    first, early, late, last = _at(
+        arcs, curve.points_mm, np.array([0.0, reach, curve.length_mm - reach, curve.length_mm])
+    )
+    return (early - first) / np.linalg.norm(early - first), (last - late) / np.linalg.norm(last - late)
