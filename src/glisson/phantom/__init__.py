@@ -1,0 +1,1 @@
+"""Digital livers with known answers: shape, interior, CT, and for the demo the deformed truth."""

@@ -1,0 +1,139 @@
+"""The body around the liver: wall, ribs, spine, lungs, heart, spleen, stomach, kidneys, bowel, great vessels.
+
+Only what a segmenter meets: neighbours that touch the liver, some with nearly its HU. Organ coordinates
+(patient LPS, mm, board at y = 0). Everything lies under the liver in painting order.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from glisson.phantom.implicit import Points, Solid, cone, difference, ellipsoid, grown, half_space, intersection, union
+from glisson.phantom.liver_shape import LiverShape
+from glisson.phantom.proportions import Proportions
+
+BODY_BOX = np.array([[-172.0, -112.0, -98.0], [172.0, 104.0, 108.0]])
+"""Lowest and highest corner (2, 3) of what the CT shows, mm."""
+
+AIR_HU = -1000.0
+
+
+def body_solids(proportions: Proportions, shape: LiverShape) -> list[tuple[Solid, float]]:
+    """Solids with their HU in painting order."""
+    return _wall_solids(shape) + _neighbours(proportions) + _dorsal_organs()
+
+
+def _wall_solids(shape: LiverShape) -> list[tuple[Solid, float]]:
+    """Skin and fat, muscle, the fat inside, ribs, lungs above a diaphragm that lies on the liver."""
+    skin = _column(166.0, 106.0)
+    muscle = _column(154.0, 95.0)
+    inside = _column(146.0, 86.0)
+    dome = union(
+        [
+            ellipsoid([-57.0, -15.0, -6.0], [84.0, 74.0, 76.0]),
+            ellipsoid([48.0, -8.0, -4.0], [74.0, 70.0, 66.0]),
+        ],
+        blend=20.0,
+    )
+    # The diaphragm lies on the liver of every member, so the dome includes the liver itself.
+    dome = union([dome, grown(shape.liver, 3.0)], blend=8.0)
+    lungs = intersection(difference(_column(145.0, 85.0), dome), half_space(2, 5.0, keep_below=False))
+    diaphragm = intersection(grown(lungs, 3.0), inside)
+    return [(skin, -95.0), (muscle, 58.0), (inside, -90.0), (diaphragm, 55.0), (lungs, -830.0), *_ribs()]
+
+
+def _neighbours(proportions: Proportions) -> list[tuple[Solid, float]]:
+    """Heart, stomach, colon and duodenum: they touch the liver, and heart and stomach wall look like it."""
+    place = proportions.place
+    heart = ellipsoid(place([30.0, -32.0, 86.0]), [48.0, 38.0, 34.0])
+    stomach = ellipsoid(place([82.0, -22.0, -8.0]), [42.0, 36.0, 50.0])
+    colon = union(
+        [
+            cone(place([-100.0, -38.0, -86.0]), place([-20.0, -52.0, -88.0]), 17.0, 16.0),
+            cone(place([-20.0, -52.0, -88.0]), place([70.0, -50.0, -84.0]), 16.0, 15.0),
+        ]
+    )
+    gas = ellipsoid(place([-20.0, -60.0, -88.0]), [34.0, 7.0, 10.0])
+    duodenum = cone(place([2.0, 2.0, -34.0]), place([-42.0, 13.0, -90.0]), 12.0, 13.0)
+    return [
+        (heart, 118.0),
+        (stomach, 88.0),
+        (grown(stomach, -4.0), 28.0),
+        (ellipsoid(place([84.0, -46.0, -4.0]), [22.0, 7.0, 24.0]), -820.0),
+        (colon, 45.0),
+        (gas, -850.0),
+        (duodenum, 62.0),
+    ]
+
+
+def _dorsal_organs() -> list[tuple[Solid, float]]:
+    """Spleen, kidneys, aorta, spine and the muscles beside it, all behind the board's plane or lateral."""
+    spleen = ellipsoid([110.0, 34.0, 34.0], [26.0, 38.0, 46.0])
+    right_kidney = ellipsoid([-62.0, 36.0, -58.0], [28.0, 25.0, 50.0])
+    left_kidney = ellipsoid([66.0, 40.0, -40.0], [27.0, 25.0, 50.0])
+    back_muscle = union([cone([x, 72.0, -130.0], [x, 72.0, 140.0], 22.0, 22.0) for x in (-38.0, 38.0)])
+    psoas = union([cone([x, 46.0, -130.0], [0.6 * x, 52.0, -30.0], 18.0, 8.0) for x in (-34.0, 34.0)])
+    vertebrae = [ellipsoid([0.0, 48.0, z], [23.0, 20.0, 15.5]) for z in np.arange(-120.0, 140.0, 30.0)]
+    discs = cone([0.0, 48.0, -130.0], [0.0, 48.0, 140.0], 18.0, 18.0)
+    arches = union([cone([0.0, 72.0, z], [0.0, 92.0, z - 10.0], 7.0, 5.0) for z in np.arange(-120.0, 140.0, 30.0)])
+    bone = union(vertebrae)
+    canal = cone([0.0, 70.0, -130.0], [0.0, 70.0, 140.0], 8.0, 8.0)
+    aorta = cone([16.0, 20.0, -130.0], [14.0, 22.0, 140.0], 11.0, 12.0)
+    crura = union([cone([x, 22.0, -60.0], [0.5 * x, 14.0, 70.0], 7.0, 7.0) for x in (-18.0, 24.0)])
+    return [
+        (back_muscle, 58.0),
+        (psoas, 60.0),
+        (crura, 58.0),
+        (discs, 90.0),
+        (bone, 420.0),
+        (grown(bone, -2.5), 190.0),
+        (arches, 420.0),
+        (canal, 25.0),
+        (aorta, 185.0),
+        (spleen, 122.0),
+        (right_kidney, 195.0),
+        (ellipsoid([-58.0, 36.0, -58.0], [11.0, 10.0, 26.0]), 20.0),
+        (left_kidney, 195.0),
+        (ellipsoid([62.0, 40.0, -40.0], [11.0, 10.0, 26.0]), 20.0),
+    ]
+
+
+def _ribs() -> list[tuple[Solid, float]]:
+    """Ribs as tilted rings in the muscle of the wall: dense outside, spongy inside."""
+    rings = [_ring(150.0, 90.0, height) for height in np.arange(-62.0, 200.0, 26.0)]
+    ribs = intersection(union(rings), half_space(1, 84.0, keep_below=True))
+    return [(ribs, 480.0), (grown(ribs, -1.6), 240.0)]
+
+
+def _ring(half_width: float, half_depth: float, height: float) -> Solid:
+    """One rib: an elliptic ring that sinks towards the front by 35 degrees, 5 mm thick and 12 mm tall."""
+    sink = np.tan(np.deg2rad(35.0))
+
+    def distance(points: Points) -> NDArray[Any]:
+        around = _oval(points, half_width, half_depth)
+        level = points[..., 2] - (height + sink * (points[..., 1] - 40.0))
+        # The slope of `level` is 1/cos 35°; a superellipse rounds the section's corners.
+        value: NDArray[Any] = 2.5 * (np.sqrt((around / 2.5) ** 2 + (level * 0.82 / 6.0) ** 2) - 1.0)
+        return value
+
+    # Within 95 mm to either side of y = 40 a rib moves by 67 mm up or down.
+    low = [-half_width - 4.0, -half_depth - 4.0, height - sink * (half_depth + 44.0) - 8.0]
+    high = [half_width + 4.0, half_depth + 4.0, height + sink * (half_depth - 36.0) + 8.0]
+    return Solid(distance, np.array([low, high]))
+
+
+def _column(half_width: float, half_depth: float) -> Solid:
+    """An upright elliptic cylinder about the body's axis."""
+    bounds = np.array([[-half_width, -half_depth, -1e3], [half_width, half_depth, 1e3]])
+    return Solid(lambda points: _oval(points, half_width, half_depth), bounds)
+
+
+def _oval(points: Points, half_width: float, half_depth: float) -> NDArray[Any]:
+    """Signed distance (close to the surface) from an upright elliptic cylinder."""
+    radii = np.array([half_width, half_depth], dtype=points.dtype)
+    scaled = points[..., :2] / radii
+    first = np.sqrt(np.einsum("...i,...i->...", scaled, scaled))
+    second = np.sqrt(np.einsum("...i,...i->...", scaled / radii, scaled / radii))
+    value: NDArray[Any] = first * (first - 1.0) / np.maximum(second, 1e-6)
+    return value
