@@ -48,20 +48,23 @@ def technique_class(kind: str, name: str) -> Any:
         BadInput: unknown kind or name, two packages offering the same name, a package that does not
             load, or dependencies that are missing (the sentence says what to install).
     """
-    found = [point for point in _points(kind) if point.name == name]
-    if not found:
-        known = sorted({point.name for point in _points(kind)})
-        raise BadInput(f"There is no {kind} technique {name!r}; known are {known}.")
-    if len(found) > 1:
-        packages = sorted(_package(point) for point in found)
-        raise BadInput(f"The {kind} technique {name!r} is offered by {packages}; uninstall all but one.")
+    point = _point(kind, name)
     try:
-        loaded, missing = _loaded(found[0])
+        loaded, missing = _loaded(point)
     except Exception as error:  # a plug-in may fail in any way while it is imported
-        raise BadInput(f"The {kind} technique {name!r} of {_package(found[0])} does not load: {error}.") from error
+        raise BadInput(f"The {kind} technique {name!r} of {_package(point)} does not load: {error}.") from error
     if missing:
         raise BadInput(f"The {kind} technique {name!r} needs {', '.join(missing)}; install them first.")
     return loaded
+
+
+def technique_package(kind: str, name: str) -> str:
+    """The distribution that offers a technique.
+
+    Raises:
+        BadInput: there is no such technique.
+    """
+    return _package(_point(kind, name))
 
 
 def make_technique(kind: str, name: str, values: Mapping[str, Any], where: str) -> Any:
@@ -95,6 +98,17 @@ def _loaded(point: EntryPoint) -> tuple[Any, tuple[str, ...]]:
     if not isinstance(getattr(loaded, "summary", None), str) or getattr(loaded, "name", None) != point.name:
         raise TypeError(f"it needs a summary and the name {point.name!r} under which it is registered")
     return loaded, tuple(loaded.missing_dependencies())
+
+
+def _point(kind: str, name: str) -> EntryPoint:
+    found = [point for point in _points(kind) if point.name == name]
+    if not found:
+        known = sorted({point.name for point in _points(kind)})
+        raise BadInput(f"There is no {kind} technique {name!r}; known are {known}.")
+    if len(found) > 1:
+        packages = sorted(_package(point) for point in found)
+        raise BadInput(f"The {kind} technique {name!r} is offered by {packages}; uninstall all but one.")
+    return found[0]
 
 
 def _points(kind: str) -> tuple[EntryPoint, ...]:

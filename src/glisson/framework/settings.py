@@ -1,0 +1,119 @@
+"""What a person decides about a case: techniques with their parameters, materials, attachments, target, plane.
+
+There is no field for free text, so nothing here can identify a patient.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Any
+
+from glisson.core.errors import BadInput
+from glisson.core.model import Material
+from glisson.core.parameters import build_parameters, parameter
+from glisson.core.registry import make_technique, technique_class
+
+SCHEMA = 1
+"""Version of the case folder that this Glisson writes, and the newest that it reads."""
+
+KINDS = {"segment": "segmenter", "surface": "surface-extractor", "mesh": "mesher", "simulate": "solver"}
+"""Section of `case.toml` → kind of the technique that is chosen there."""
+
+Point = tuple[float, float, float]
+
+DEFAULT_MATERIAL = Material("neo-hookean", young_modulus_kpa=7.0, poisson_ratio=0.45, density_kg_m3=1060.0)
+"""Soft liver in the range of the elastographies that the dissertation cites (6 to 13 kPa)."""
+
+
+@dataclass(frozen=True)
+class TechniqueChoice:
+    """A technique of a section by name, and those of its parameters that were set."""
+
+    section: str
+    technique: str
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
+
+    @property
+    def kind(self) -> str:
+        """Kind of technique that the section takes."""
+        return KINDS[self.section]
+
+    def all_parameters(self, where: str) -> Any:
+        """The parameters with the technique's defaults, an instance of its `Parameters`.
+
+        Raises:
+            BadInput: the technique cannot be used, or a parameter does not fit it.
+        """
+        made = technique_class(self.kind, self.technique)
+        return build_parameters(made.Parameters, self.parameters, f"{where}: {self.section} ({self.technique})")
+
+    def make(self, where: str) -> Any:
+        """The technique, ready for work; raises as `all_parameters`."""
+        return make_technique(self.kind, self.technique, self.parameters, f"{where}: {self.section} ({self.technique})")
+
+
+@dataclass(frozen=True)
+class SegmentSettings:
+    """What the segmentation starts from."""
+
+    seed_points_mm: tuple[Point, ...] = parameter((), "Clicks inside the liver, a list of [x, y, z] in LPS mm.")
+
+
+@dataclass(frozen=True)
+class PlaneSettings:
+    """Where the resection plane lies."""
+
+    distance_mm: float = parameter(
+        5.0, "Distance along the wire, inward, from the target's surface to the plane (mm).", 0.0, 100.0
+    )
+    points_mm: tuple[Point, Point, Point] | None = parameter(
+        None, "Three points [x, y, z] (LPS mm) of the plane; needed where no wire lies in the duct."
+    )
+
+
+SECTIONS: Mapping[str, type[Any]] = MappingProxyType({"segment": SegmentSettings, "plane": PlaneSettings})
+"""Section of `case.toml` → dataclass of the keys that are ours there, beside those of a technique."""
+
+DEFAULT_TECHNIQUES = MappingProxyType(
+    {"segment": "seeded-contour", "surface": "marching-cubes", "mesh": "ftetwild", "simulate": "quasi-static"}
+)
+"""Section of `case.toml` → technique that is used where none was chosen."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Everything that `case.toml` holds.
+
+    `choices` has one technique for each section of `KINDS`; `materials` is by the name of the region
+    ("liver", "tumours"); `target` is the tumour to remove (None: the largest one); `seed` is that of
+    every random number.
+    """
+
+    choices: Mapping[str, TechniqueChoice] = field(default_factory=dict)
+    materials: Mapping[str, Material] = field(default_factory=lambda: {"liver": DEFAULT_MATERIAL})
+    segment: SegmentSettings = field(default_factory=SegmentSettings)
+    plane: PlaneSettings = field(default_factory=PlaneSettings)
+    target: str | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        unknown = sorted(set(self.choices) - set(KINDS))
+        if unknown:
+            raise BadInput(f"A case has no techniques for {unknown}; it has them for {sorted(KINDS)}.")
+        choices = {name: self.choices.get(name, TechniqueChoice(name, DEFAULT_TECHNIQUES[name])) for name in KINDS}
+        object.__setattr__(self, "choices", MappingProxyType(choices))
+        object.__setattr__(self, "materials", MappingProxyType(dict(self.materials)))
+
+    def choosing(self, section: str, technique: str | None, parameters: Mapping[str, Any]) -> "Settings":
+        """These settings with another technique in a section, or with some of its parameters set anew.
+
+        Parameters that were set for one technique are not carried over to another.
+        """
+        old = self.choices[section]
+        name = old.technique if technique is None else technique
+        kept = old.parameters if name == old.technique else {}
+        choice = TechniqueChoice(section, name, {**kept, **parameters})
+        return replace(self, choices={**self.choices, section: choice})
