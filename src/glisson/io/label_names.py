@@ -40,7 +40,8 @@ def canonical_name(name: str) -> str:
 
 def canonical_names(names: Iterable[str]) -> list[str]:
     """Canonical names in the same order, all different: a second claimant keeps its own name, a tumour gets
-    the next free number."""
+    the next free number.
+    """
     taken: list[str] = []
     for name in names:
         found = canonical_name(name)

@@ -34,9 +34,13 @@ def rescaled(stored: NDArray[Any], slope: float, intercept: float) -> NDArray[An
         native: NDArray[Any] = np.ascontiguousarray(stored.astype(stored.dtype.newbyteorder("="), copy=False))
         return native
     if stored.dtype.kind in "iu" and slope == int(slope) and intercept == int(intercept):
-        ends = [int(end) * int(slope) + int(intercept) for end in (stored.min(), stored.max())]
-        kind = whole_type(min(ends), max(ends))
-        return stored.astype(kind) * kind.type(slope) + kind.type(intercept)
+        low, high = int(stored.min()), int(stored.max())
+        scaled = (low * int(slope), high * int(slope))
+        # Every intermediate value must fit, not only the ends of the result.
+        steps = (low, high, int(slope), int(intercept), *scaled, *(value + int(intercept) for value in scaled))
+        kind = whole_type(min(steps), max(steps))
+        whole: NDArray[Any] = stored.astype(kind) * kind.type(slope) + kind.type(intercept)
+        return whole
     values: NDArray[Any] = stored.astype(np.float32) * np.float32(slope) + np.float32(intercept)
     return values
 
@@ -67,4 +71,5 @@ def as_whole_numbers(voxels: NDArray[Any]) -> NDArray[Any]:
     low, high = (int(voxels.min()), int(voxels.max())) if voxels.size else (0, 0)
     if low < 0:
         raise BadInput(f"labels must not be negative, but it holds {low}.")
-    return voxels.astype(whole_type(0, high), copy=False)
+    numbers: NDArray[Any] = voxels.astype(whole_type(0, high), copy=False)
+    return numbers

@@ -1,0 +1,114 @@
+"""A model on disk: `model.vtu` (mesh and regions) and `model.json` (materials, node sets, structures)."""
+
+from pathlib import Path
+from typing import Any
+
+from glisson.core import BadInput, Curve, Material, Model, Structures, TriangleSurface, Tumour, VesselTree
+from glisson.io.mesh_pairs import read_pair, write_pair
+from glisson.io.records import Record
+
+SCHEMA = 1
+"""Version of the layout that is written; older ones are read."""
+
+_NAME = "model"
+
+
+def write_model(folder: str | Path, model: Model) -> None:
+    """Write `model.vtu` and `model.json` into `folder` with all digits; atomic, other files there stay.
+
+    Raises:
+        BadInput: the place cannot be written.
+        WriteFailed: the disk is full.
+    """
+    values = {
+        "schema": SCHEMA,
+        "materials": {number: _material_table(material) for number, material in model.materials.items()},
+        "region_names": dict(model.region_names),
+        "node_sets": dict(model.node_sets),
+        "structures": _structures_table(model.structures),
+    }
+    write_pair(Path(folder), _NAME, model.mesh, {}, values)
+
+
+def read_model(folder: str | Path) -> Model:
+    """Read what `write_model` wrote.
+
+    Raises:
+        BadInput: a file is absent, damaged or of a newer Glisson, or the two do not belong together.
+    """
+    with read_pair(Path(folder), _NAME, "a model", SCHEMA) as (mesh, _, record):
+        names = record.record("region_names")
+        sets = record.record("node_sets")
+        return Model(
+            mesh=mesh,
+            materials={_region(key): _material(entry) for key, entry in record.named_records("materials").items()},
+            region_names={_region(key): names.text(key) for key in names.keys()},  # noqa: SIM118  # no dict
+            node_sets={key: sets.wholes(key, -1) for key in sets.keys()},  # noqa: SIM118
+            structures=_structures(record.record("structures")),
+        )
+
+
+def _region(key: str) -> int:
+    if not key.lstrip("-").isdecimal():
+        raise BadInput(f"a region must be a whole number, not {key!r}.")
+    return int(key)
+
+
+def _material_table(material: Material) -> dict[str, Any]:
+    return {
+        "law": material.law,
+        "young_modulus_kpa": material.young_modulus_kpa,
+        "poisson_ratio": material.poisson_ratio,
+        "density_kg_m3": material.density_kg_m3,
+    }
+
+
+def _material(record: Record) -> Material:
+    with record.building():
+        return Material(
+            record.text("law"),
+            record.number("young_modulus_kpa"),
+            record.number("poisson_ratio"),
+            record.number("density_kg_m3"),
+        )
+
+
+def _structures_table(structures: Structures) -> dict[str, Any]:
+    return {
+        "tumours": [
+            {"name": t.name, "vertices_mm": t.surface.vertices, "triangles": t.surface.triangles}
+            for t in structures.tumours
+        ],
+        "trees": [
+            {"name": tree.name, "points_mm": tree.points_mm, "radii_mm": tree.radii_mm, "edges": tree.edges}
+            for tree in structures.trees
+        ],
+        "duct_mm": structures.duct.points_mm if structures.duct else None,
+        "wire_length_mm": structures.wire_length_mm,
+    }
+
+
+def _structures(record: Record) -> Structures:
+    with record.building():
+        return Structures(
+            tumours=tuple(_tumour(entry) for entry in record.records("tumours")),
+            trees=tuple(_tree(entry) for entry in record.records("trees")),
+            duct=Curve(record.floats("duct_mm", -1, 3)) if record.has("duct_mm") else None,
+            wire_length_mm=record.number_or_none("wire_length_mm"),
+        )
+
+
+def _tumour(record: Record) -> Tumour:
+    with record.building():
+        surface = TriangleSurface(record.floats("vertices_mm", -1, 3), record.wholes("triangles", -1, 3))
+        return Tumour(record.text("name"), surface)
+
+
+def _tree(record: Record) -> VesselTree:
+    with record.building():
+        return VesselTree(
+            record.text("name"),
+            record.floats("points_mm", -1, 3),
+            record.floats("radii_mm", -1),
+            record.wholes("edges", -1, 2),
+        )

@@ -1,0 +1,139 @@
+"""`scenario.toml`: what is done to the organ, for people to read and change (LPS mm, degrees, N, kPa)."""
+
+from pathlib import Path
+from typing import Any, cast
+
+import tomli_w
+
+from glisson.core import Board, ContactLaw, Lever, LeverDrive, Scenario, Stage
+from glisson.core.arrays import FloatArray
+from glisson.io.atomic import atomic_path
+from glisson.io.records import Record, read_record
+
+SCHEMA = 1
+"""Version of the layout of `scenario.toml` that is written; older ones are read."""
+
+_DIRECTIONS = ("scan_gravity", "surgery_gravity")
+
+
+def read_scenario(path: str | Path) -> Scenario:
+    """Read a scenario; tools come out as boards first, then levers.
+
+    Raises:
+        BadInput: absent, damaged, of a newer Glisson; an unknown key, a wrong type or an impossible value,
+            named by its key path ("stages[1].friction").
+    """
+    with read_record(Path(path), "a scenario", SCHEMA) as record:
+        boards = [_board(entry) for entry in record.records("boards", ())]
+        levers = [_lever(entry) for entry in record.records("levers", ())]
+        return Scenario(
+            tools=(*boards, *levers),
+            stages=tuple(_stage(entry) for entry in record.records("stages")),
+            scan_gravity=_direction(record, "scan_gravity"),
+            surgery_gravity=_direction(record, "surgery_gravity"),
+            scan_supports=record.texts("scan_supports", ()),
+            rest_shape=cast(Any, record.text("rest_shape", "from-gravity")),  # the core type checks the choice
+        )
+
+
+def write_scenario(path: str | Path, scenario: Scenario) -> None:
+    """Write a scenario; atomic. A gravity that is None is left out.
+
+    Raises:
+        BadInput: the place cannot be written.
+        WriteFailed: the disk is full.
+    """
+    table: dict[str, Any] = {"schema": SCHEMA, "rest_shape": scenario.rest_shape}
+    for key in _DIRECTIONS:
+        direction = getattr(scenario, key)
+        if direction is not None:
+            table[key] = direction.tolist()
+    table["scan_supports"] = list(scenario.scan_supports)
+    table["boards"] = [_board_table(tool) for tool in scenario.tools if isinstance(tool, Board)]
+    table["levers"] = [_lever_table(tool) for tool in scenario.tools if isinstance(tool, Lever)]
+    table["stages"] = [_stage_table(stage) for stage in scenario.stages]
+    with atomic_path(path) as temporary:
+        temporary.write_text(tomli_w.dumps(table, multiline_strings=False), encoding="utf-8")
+
+
+def _direction(record: Record, key: str) -> FloatArray | None:
+    return record.floats(key, 3) if record.has(key) else None
+
+
+def _board(record: Record) -> Board:
+    with record.building():
+        return Board(
+            record.text("name"),
+            record.floats("point_mm", 3),
+            record.floats("normal", 3),
+            record.flag("conforming", Board.conforming),
+        )
+
+
+def _lever(record: Record) -> Lever:
+    sizes = ("length_mm", "width_mm", "thickness_mm", "edge_radius_mm")
+    with record.building():
+        return Lever(
+            name=record.text("name"),
+            hinge_mm=record.floats("hinge_mm", 3),
+            axis=record.floats("axis", 3),
+            arm=record.floats("arm", 3),
+            **{size: record.number(size) for size in sizes if record.has(size)},
+        )
+
+
+def _stage(record: Record) -> Stage:
+    with record.building():
+        contact = ContactLaw(
+            friction=record.number("friction", ContactLaw.friction),
+            cohesion_kpa=record.number("cohesion_kpa", ContactLaw.cohesion_kpa),
+        )
+        return Stage(
+            name=record.text("name"),
+            contact=contact,
+            drives=tuple(_drive(entry) for entry in record.records("drives", ())),
+            gravity=record.flag("gravity", Stage.gravity),
+            fixed=record.texts("fixed", Stage.fixed),
+        )
+
+
+def _drive(record: Record) -> LeverDrive:
+    with record.building():
+        return LeverDrive(record.text("lever"), record.number_or_none("angle_deg"), record.number_or_none("force_n"))
+
+
+def _board_table(board: Board) -> dict[str, Any]:
+    return {
+        "name": board.name,
+        "point_mm": board.point_mm.tolist(),
+        "normal": board.normal.tolist(),
+        "conforming": board.conforming,
+    }
+
+
+def _lever_table(lever: Lever) -> dict[str, Any]:
+    return {
+        "name": lever.name,
+        "hinge_mm": lever.hinge_mm.tolist(),
+        "axis": lever.axis.tolist(),
+        "arm": lever.arm.tolist(),
+        "length_mm": float(lever.length_mm),
+        "width_mm": float(lever.width_mm),
+        "thickness_mm": float(lever.thickness_mm),
+        "edge_radius_mm": float(lever.edge_radius_mm),
+    }
+
+
+def _stage_table(stage: Stage) -> dict[str, Any]:
+    drives = []
+    for drive in stage.drives:
+        target = {"angle_deg": drive.angle_deg, "force_n": drive.force_n}
+        drives.append({"lever": drive.lever} | {key: float(v) for key, v in target.items() if v is not None})
+    return {
+        "name": stage.name,
+        "friction": float(stage.contact.friction),
+        "cohesion_kpa": float(stage.contact.cohesion_kpa),
+        "gravity": stage.gravity,
+        "fixed": list(stage.fixed),
+        "drives": drives,
+    }
