@@ -8,6 +8,8 @@ import numpy as np
 
 from glisson.core import BadInput, LabelMap, Volume
 from glisson.io.decoding import decoding
+from glisson.io.dicom import has_dicom, read_dicom_folder, read_dicom_mask
+from glisson.io.ircad import read_mask_folders
 from glisson.io.label_names import canonical_name, canonical_table
 from glisson.io.nifti import read_nifti, write_nifti
 from glisson.io.nrrd_files import read_nrrd, write_nrrd
@@ -33,7 +35,7 @@ def read_volume(path: str | Path, series_uid: str | None = None) -> Volume:
         BadInput: absent, damaged, too large, not 3-D, or of unclear geometry.
     """
     source = Path(path)
-    image = _stored(source)
+    image = read_dicom_folder(source, series_uid) if source.is_dir() else _stored(source)
     with decoding(source, "an image"):
         return Volume(image.voxels, image.grid, image.modality or "CT")
 
@@ -66,10 +68,26 @@ def read_labels(path: str | Path, scheme: str | None = None, names: Mapping[int,
     source = Path(path)
     if scheme is not None and scheme not in SCHEMES:
         raise BadInput(f"Unknown label scheme {scheme!r}; use one of {list(SCHEMES)}.")
-    image = _stored(source)
+    image = read_dicom_mask(source) if source.is_dir() else _stored(source)
     with decoding(source, "a label map"):
         voxels = as_whole_numbers(image.voxels)
         return LabelMap(voxels, image.grid, _label_names(source, image, voxels, scheme, names))
+
+
+def read_label_maps(
+    path: str | Path, scheme: str | None = None, names: Mapping[int, str] | None = None
+) -> tuple[LabelMap, ...]:
+    """Read whatever holds labels: one file, one mask folder, or a folder of mask folders (one map each).
+
+    Arguments as for `read_labels`.
+
+    Raises:
+        BadInput: as for `read_labels`.
+    """
+    source = Path(path)
+    if source.is_dir() and not has_dicom(source):
+        return read_mask_folders(source)
+    return (read_labels(source, scheme, names),)
 
 
 def write_labels(path: str | Path, labels: LabelMap) -> None:
