@@ -69,6 +69,39 @@ def require_same_grid(reference: Volume | LabelMap | Grid, other: Volume | Label
         )
 
 
+def on_grid_of(reference: Volume | Grid, labels: LabelMap, what: str) -> LabelMap:
+    """The same labels with their axes in the order and sense of the reference's; nothing is interpolated.
+
+    Other tools often store a scan's labels with axes flipped, though each voxel lies on one of the scan's.
+
+    Args:
+        reference: the scan, usually.
+        labels: what must lie on its grid.
+        what: its name for the sentence ("the label map liver.nii.gz").
+
+    Raises:
+        BadInput: the voxels do not coincide; both grids are described.
+    """
+    wanted = reference if isinstance(reference, Grid) else reference.grid
+    turn = wanted.direction.T @ labels.grid.direction
+    order = np.abs(turn).argmax(axis=1)
+    if sorted(order) != [0, 1, 2]:
+        require_same_grid(wanted, labels, what)
+    voxels = labels.voxels.transpose(order)
+    flipped = [axis for axis in range(3) if turn[axis, order[axis]] < 0.0]
+    first = np.zeros(3)
+    first[order[flipped]] = np.array(labels.grid.shape)[order[flipped]] - 1
+    signs = np.where(np.isin(np.arange(3), flipped), -1.0, 1.0)
+    grid = Grid(
+        (voxels.shape[0], voxels.shape[1], voxels.shape[2]),
+        labels.grid.spacing_mm[order],
+        labels.grid.points_from_indices(first),
+        labels.grid.direction[:, order] * signs,
+    )
+    require_same_grid(wanted, grid, what)
+    return LabelMap(np.ascontiguousarray(np.flip(voxels, tuple(flipped))), wanted, labels.names)
+
+
 def _stacked(masks: dict[str, NDArray[np.bool_]], grid: Grid) -> LabelMap:
     numbers = {name: number for number, name in enumerate(masks, start=1)}
     voxels: NDArray[Any] = np.zeros(grid.shape, dtype=whole_type(0, len(masks)))

@@ -36,6 +36,10 @@ class Record:
         self._asked.add(key)
         return self._values.get(key) is not None
 
+    def value(self, key: str) -> Any:
+        """Whatever is there."""
+        return self._get(key, _REQUIRED)
+
     def text(self, key: str, default: str = _REQUIRED) -> str:
         """A text."""
         value = self._get(key, default)
@@ -191,12 +195,17 @@ def read_record(path: Path, kind: str, newest_schema: int) -> Iterator[Record]:
     """
     with decoding(path, kind):
         check_file_size(path)
-        text = path.read_bytes().decode("utf-8")
-        values = tomllib.loads(text) if path.suffix == ".toml" else json.loads(text)
+        toml = path.suffix == ".toml"
+        values = tomllib.loads(path.read_bytes().decode("utf-8")) if toml else load_json(path)
         record = Record(values)
         record.check_schema(newest_schema)
         yield record
         record.finish()
+
+
+def load_json(path: Path) -> Any:
+    """Content of a JSON file. Run inside `decoding`."""
+    return json.loads(path.read_bytes().decode("utf-8"))
 
 
 def write_json(path: Path, values: Mapping[str, Any]) -> None:
