@@ -74,7 +74,9 @@ def write_nrrd(
         header["modality"] = modality
     if names is not None:
         header["label_names"] = json.dumps({str(number): name for number, name in names.items()})
-    stored = voxels.astype(np.uint8) if voxels.dtype.kind == "b" else voxels
+    # The format knows neither truth values nor half precision.
+    known = {"b": np.uint8, "f": np.float32}.get(voxels.dtype.kind) if voxels.dtype.itemsize <= 2 else None
+    stored = voxels.astype(known) if known else voxels
     with atomic_path(path) as temporary:
         nrrd.write(str(temporary), stored, header, compression_level=6)
 
