@@ -50,7 +50,7 @@ class MarchingCubes:
     def extract(self, mask: NDArray[np.bool_], labels: LabelMap) -> TriangleSurface:
         """Closed outward surface (LPS mm) of a mask [i, j, k] on the grid of `labels`.
 
-        A mask that touches the scan's border is closed there; see `touched_borders`.
+        A mask that touches the scan's border is closed there; see `borders.touched_borders`.
 
         Raises:
             BadInput: the mask is empty or on another grid.
@@ -87,20 +87,6 @@ class MarchingCubes:
         if TriangleSurface(vertices, faces).volume_mm3 < 0.0:
             faces = faces[:, ::-1]
         return vertices, faces
-
-
-def touched_borders(mask: NDArray[np.bool_]) -> tuple[str, ...]:
-    """Sentences about borders of the scan that a mask [i, j, k] reaches: the organ may go on beyond."""
-    sentences = []
-    for axis, name in enumerate("ijk"):
-        for index, side in ((0, "first"), (-1, "last")):
-            count = int(np.take(mask, index, axis=axis).sum())
-            if count:
-                sentences.append(
-                    f"The organ touches the scan's {side} {name} layer with {count} voxels and was closed there; "
-                    "it may go on beyond the scan."
-                )
-    return tuple(sentences)
 
 
 def _level_enclosing(field: NDArray[np.float32], count: int) -> float:

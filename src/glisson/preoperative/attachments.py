@@ -1,0 +1,139 @@
+"""What holds the organ: named sets of surface nodes, chosen by a box or by a direction.
+
+The liver is held at its back, by the coronary and triangular ligaments around the bare area and by the
+inferior vena cava (dissertation, section 1.2 and stage 1 of section 4.3: "the back side of the liver");
+the left lobe is free.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from glisson.core.arrays import FloatArray, IntArray
+from glisson.core.errors import BadInput
+from glisson.core.mesh import TetMesh
+from glisson.core.parameters import build_parameters, parameter
+
+DIRECTIONS = {
+    "left": (1.0, 0.0, 0.0),
+    "right": (-1.0, 0.0, 0.0),
+    "posterior": (0.0, 1.0, 0.0),
+    "anterior": (0.0, -1.0, 0.0),
+    "superior": (0.0, 0.0, 1.0),
+    "inferior": (0.0, 0.0, -1.0),
+}
+"""Anatomical directions in LPS."""
+
+
+@dataclass(frozen=True)
+class BoxAttachment:
+    """All surface nodes inside a box that is aligned with the patient's axes (LPS mm)."""
+
+    low_mm: tuple[float, float, float]
+    high_mm: tuple[float, float, float]
+    name: str = parameter("back", "Name of the node set.")
+
+    def __post_init__(self) -> None:
+        if not all(low < high for low, high in zip(self.low_mm, self.high_mm, strict=True)):
+            raise BadInput(
+                f"The box of attachment {self.name!r} needs low_mm below high_mm in x, y and z, "
+                f"not {list(self.low_mm)} and {list(self.high_mm)}."
+            )
+
+    def chosen(self, points_mm: FloatArray) -> NDArray[np.bool_]:
+        """Which surface points (n, 3) belong to the attachment, (n,)."""
+        inside: NDArray[np.bool_] = np.all((points_mm >= self.low_mm) & (points_mm <= self.high_mm), axis=1)
+        return inside
+
+
+@dataclass(frozen=True)
+class DirectionAttachment:
+    """The surface nodes that lie furthest along one anatomical direction or a mixture of some.
+
+    Along each direction a point's place is measured as a fraction of the organ's extent; a mixture takes
+    the mean of these fractions. `reach` of the range of that mean, from its far end, is taken.
+    """
+
+    name: str = parameter("back", "Name of the node set.")
+    directions: tuple[str, ...] = parameter(
+        ("posterior", "superior"), f"Where it lies: one or more of {', '.join(DIRECTIONS)}."
+    )
+    reach: float = parameter(0.3, "Fraction of the organ's extent along these directions that is held.", 0.001, 1.0)
+    left_limit: float = parameter(
+        0.55, "Only nodes up to this fraction of the organ's width, from its right side (1: all).", 0.0, 1.0
+    )
+
+    def __post_init__(self) -> None:
+        unknown = [direction for direction in self.directions if direction not in DIRECTIONS]
+        if unknown or not self.directions:
+            raise BadInput(
+                f"Attachment {self.name!r} needs directions among {list(DIRECTIONS)}, not {list(self.directions)}."
+            )
+
+    def chosen(self, points_mm: FloatArray) -> NDArray[np.bool_]:
+        """Which surface points (n, 3) belong to the attachment, (n,)."""
+        low, extent = points_mm.min(axis=0), np.maximum(np.ptp(points_mm, axis=0), 1e-9)
+        fractions = (points_mm - low) / extent
+        score = np.mean([_along(fractions, direction) for direction in self.directions], axis=0)
+        far = score >= score.max() - self.reach * np.ptp(score)
+        result: NDArray[np.bool_] = far & (fractions[:, 0] <= self.left_limit)
+        return result
+
+
+Attachment = BoxAttachment | DirectionAttachment
+
+DEFAULT_ATTACHMENTS: tuple[Attachment, ...] = (DirectionAttachment(),)
+"""The superior dorsal part of the surface, right and middle, as "back"."""
+
+_KINDS: dict[str, type[Attachment]] = {"box": BoxAttachment, "direction": DirectionAttachment}
+
+
+def attachments_from_tables(tables: Sequence[Mapping[str, Any]], where: str) -> tuple[Attachment, ...]:
+    """Attachments from tables with `kind` ("box" or "direction", the default) and that kind's fields.
+
+    Raises:
+        BadInput: an unknown kind or field, a wrong type or a value outside its range.
+    """
+    made = []
+    for table in tables:
+        kind = table.get("kind", "direction")
+        if kind not in _KINDS:
+            raise BadInput(f"{where}: the kind of an attachment must be one of {sorted(_KINDS)}, not {kind!r}.")
+        made.append(build_parameters(_KINDS[kind], {k: v for k, v in table.items() if k != "kind"}, where))
+    return tuple(made)
+
+
+def node_sets(mesh: TetMesh, attachments: Sequence[Attachment]) -> dict[str, IntArray]:
+    """Surface nodes of each attachment by its name; attachments of the same name are joined.
+
+    Raises:
+        BadInput: an attachment holds no node; the sentence says where the organ is.
+    """
+    triangles, _ = mesh.boundary()
+    surface = np.unique(triangles)
+    points = mesh.nodes[surface]
+    sets: dict[str, IntArray] = {}
+    for attachment in attachments:
+        nodes = surface[attachment.chosen(points)]
+        if len(nodes) < 3:
+            raise BadInput(f"Attachment {attachment.name!r} holds {_count(len(nodes))}; the organ {_box(points)}.")
+        sets[attachment.name] = np.union1d(sets.get(attachment.name, nodes), nodes)
+    return sets
+
+
+def _along(fractions: FloatArray, direction: str) -> FloatArray:
+    unit = np.array(DIRECTIONS[direction])
+    along: FloatArray = fractions @ unit
+    return along if unit.sum() > 0.0 else along + 1.0
+
+
+def _count(nodes: int) -> str:
+    return "no node of the surface" if nodes == 0 else f"only {nodes} nodes of the surface, fewer than three"
+
+
+def _box(points: FloatArray) -> str:
+    ranges = zip("xyz", points.min(axis=0), points.max(axis=0), strict=True)
+    return "lies in " + ", ".join(f"{axis} {low:.0f} to {high:.0f}" for axis, low, high in ranges) + " mm (LPS)"
