@@ -134,14 +134,13 @@ def _writing_to(target: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        if error.errno in _FULL or error.errno == errno.EIO:
+        if error.errno in _FULL:
             raise _refusal(target, error) from error
-        raise
+        # Whatever else the system refuses (an input/output error, a quota on sizes) is a failure of writing too.
+        raise WriteFailed(f"{target} was not written: {error.strerror or error}.") from error
 
 
 def _refusal(target: Path, error: OSError) -> GlissonError:
     if error.errno in _FULL:
         return WriteFailed(f"The disk is full: {target} was not written; free some space and run again.")
-    if error.errno == errno.EIO:
-        return WriteFailed(f"The disk reports an error: {target} was not written.")
     return BadInput(f"{target} cannot be written: {error.strerror or error}.")

@@ -1,6 +1,7 @@
 """Triangle surfaces from files: VTK (legacy and XML), PLY, STL, OBJ; out: STL, VTP, PLY (LPS mm)."""
 
 import io
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -90,9 +91,11 @@ def _by_trimesh(path: Path, kind: str) -> tuple[FloatArray, IntArray]:
     check_file_size(path)
     # From bytes, not by path: material and texture files that the mesh names are not opened.
     content = io.BytesIO(path.read_bytes())
-    mesh: Any = trimesh.load(
-        content, file_type=kind, force="mesh", process=False, maintain_order=True, skip_materials=True
-    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        mesh: Any = trimesh.load(
+            content, file_type=kind, force="mesh", process=False, maintain_order=True, skip_materials=True
+        )
     vertices = np.asarray(mesh.vertices, dtype=np.float64)
     triangles = np.asarray(mesh.faces, dtype=np.int64)
     if kind != "stl" or not len(triangles):
