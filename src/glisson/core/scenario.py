@@ -11,11 +11,16 @@ from glisson.core.errors import BadInput
 
 @dataclass(frozen=True, eq=False)
 class Board:
-    """A rigid plane that the organ lies on; `normal` points from the board towards the organ."""
+    """A plane that the organ lies on; `normal` points from the board towards the organ.
+
+    A `conforming` board is bedding or neighbouring tissue that has taken the shape of the organ's
+    underside in the scan: it carries every downward-facing part of the surface where the scan shows it.
+    """
 
     name: str
     point_mm: FloatArray
     normal: FloatArray
+    conforming: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "point_mm", frozen_floats(self.point_mm, (3,), "board point"))

@@ -1,0 +1,166 @@
+"""The whole mechanical system at one instant: elastic body, tools, dead loads, held unknowns."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+
+from glisson.core.arrays import FloatArray, IntArray
+from glisson.core.scenario import ContactLaw
+from glisson.mechanics.contact import ToolContact, Touch
+from glisson.mechanics.elasticity import Elasticity
+from glisson.mechanics.elements import SurfaceQuadrature
+from glisson.mechanics.pattern import FreeSystem, block_pattern, pair_slots
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """Forces on the nodes (n, 3) in mN; in equilibrium their sum vanishes on the free unknowns.
+
+    `residual` is the norm of that sum divided by the largest of the three norms (0 without any load).
+    """
+
+    internal: FloatArray
+    contact: FloatArray
+    external: FloatArray
+    residual: float
+    unbalanced: FloatArray
+
+
+class Body:
+    """Energy, forces and stiffness of everything, as functions of the node positions (n, 3) in mm.
+
+    Args:
+        elasticity: the elastic body.
+        surface: quadrature points of its boundary.
+        contacts: one for each tool.
+        fixed: (n, 3) which unknowns are held.
+    """
+
+    def __init__(
+        self,
+        elasticity: Elasticity,
+        surface: SurfaceQuadrature,
+        contacts: Sequence[ToolContact],
+        fixed: NDArray[np.bool_],
+    ) -> None:
+        self.elasticity = elasticity
+        self.surface = surface
+        self.contacts = tuple(contacts)
+        self.external = np.zeros_like(elasticity.rest)
+        self.law = ContactLaw()
+        self._pattern = block_pattern(elasticity.mesh.tetrahedra, len(elasticity.rest))
+        self._pairs = pair_slots(self._pattern, surface.nodes)
+        self.hold(fixed)
+
+    def hold(self, fixed: NDArray[np.bool_]) -> None:
+        """Change which unknowns (n, 3) are held."""
+        self.fixed = fixed
+        self.system = FreeSystem(self._pattern, fixed.ravel())
+
+    def touches(self, positions: FloatArray, update_friction: bool = True) -> tuple[Touch, ...]:
+        """Where each tool touches; friction limits follow the present pressure unless told not to."""
+        points = self.surface.positions(positions)
+        touches = tuple(contact.touch(points) for contact in self.contacts)
+        if update_friction:
+            for contact, touch in zip(self.contacts, touches, strict=True):
+                contact.update_friction(touch, self.law)
+        return touches
+
+    def renew_cohesion(self, positions: FloatArray) -> None:
+        """Let cohesion act where tools press now."""
+        for contact, touch in zip(self.contacts, self.touches(positions, update_friction=False), strict=True):
+            contact.update_cohesion(touch)
+
+    def drop_cohesion(self, positions: FloatArray) -> None:
+        """End the cohesion of surface points that no longer touch."""
+        for contact, touch in zip(self.contacts, self.touches(positions, update_friction=False), strict=True):
+            contact.drop_cohesion(touch)
+
+    def energy(self, positions: FloatArray) -> float:
+        """Potential in µJ with friction limits as last updated; infinite where an element is inverted."""
+        elastic = self.elasticity.energy(positions)
+        if not np.isfinite(elastic):
+            return float("inf")
+        points = self.surface.positions(positions)
+        touching = sum(contact.energy(points) for contact in self.contacts)
+        return elastic + touching - float(np.vdot(self.external, positions - self.elasticity.rest))
+
+    def balance(self, positions: FloatArray, touches: Sequence[Touch]) -> Balance:
+        """All nodal forces and what is left of them on the free unknowns."""
+        points = self.surface.positions(positions)
+        internal = -self.elasticity.forces(positions)
+        pushes = np.zeros_like(points)
+        for contact, touch in zip(self.contacts, touches, strict=True):
+            pushes += contact.forces(touch, points)
+        contact_forces = self.surface.scatter(pushes, len(positions))
+        unbalanced = internal + contact_forces + self.external
+        unbalanced[self.fixed] = 0.0
+        largest = max(float(np.linalg.norm(part)) for part in (internal, contact_forces, self.external))
+        size = float(np.linalg.norm(unbalanced))
+        residual = size / largest if largest > 0.0 else 0.0
+        return Balance(internal, contact_forces, self.external, residual, unbalanced)
+
+    def stiffness(self, positions: FloatArray, touches: Sequence[Touch], project: bool) -> FloatArray:
+        """Blocks (b, 3, 3) of ∂²Π/∂x²; `project` makes them positive semi-definite."""
+        blocks = np.zeros((self._pattern.block_count, 3, 3))
+        self.elasticity.add_stiffness(positions, self._pattern, blocks, project)
+        points = self.surface.positions(positions)
+        for contact, touch in zip(self.contacts, touches, strict=True):
+            used, local = contact.stiffness(touch, points, project)
+            scatter_blocks(used, local, self.surface.shapes, self._pairs, blocks)
+        return blocks
+
+    def upper(self, blocks: FloatArray) -> csr_matrix:
+        """Upper triangle of the free unknowns' matrix."""
+        return self.system.matrix(blocks)
+
+    def times(self, blocks: FloatArray, field: FloatArray) -> FloatArray:
+        """The stiffness times a nodal field (n, 3)."""
+        result: FloatArray = _multiply(self._pattern.indptr, self._pattern.indices, blocks, field)
+        return result
+
+    def tool_motion_forces(
+        self, positions: FloatArray, touches: Sequence[Touch], angles: Sequence[float]
+    ) -> FloatArray:
+        """Nodal forces (n, 3) that tools turning to `angles` exert to first order on an organ held still."""
+        points = self.surface.positions(positions)
+        pushes = np.zeros_like(points)
+        for contact, touch, angle in zip(self.contacts, touches, angles, strict=True):
+            if angle == contact.angle:
+                continue
+            used, local = contact.stiffness(touch, points, project=True)
+            pushes[used] += np.einsum("pij,pj->pi", local, contact.motion(used, points, angle))
+        forces = self.surface.scatter(pushes, len(positions))
+        forces[self.fixed] = 0.0
+        return forces
+
+
+@njit(cache=True)
+def scatter_blocks(used: IntArray, local: FloatArray, shapes: FloatArray, pairs: IntArray, blocks: FloatArray) -> None:
+    """Add N_a N_b times the 3 × 3 matrices `local` (k, 3, 3) of the surface points `used` (k,) to the blocks."""
+    size = shapes.shape[1]
+    for n in range(len(used)):
+        p = used[n]
+        for a in range(size):
+            for b in range(size):
+                weight = shapes[p, a] * shapes[p, b]
+                slot = pairs[p, a, b]
+                for i in range(3):
+                    for j in range(3):
+                        blocks[slot, i, j] += weight * local[n, i, j]
+
+
+@njit(cache=True)
+def _multiply(indptr: IntArray, indices: IntArray, blocks: FloatArray, field: FloatArray) -> FloatArray:
+    result = np.zeros_like(field)
+    for row in range(len(indptr) - 1):
+        for slot in range(indptr[row], indptr[row + 1]):
+            column = indices[slot]
+            for i in range(3):
+                for j in range(3):
+                    result[row, i] += blocks[slot, i, j] * field[column, j]
+    return result

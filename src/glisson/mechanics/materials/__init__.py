@@ -1,0 +1,1 @@
+"""Material laws, one small file each."""

@@ -1,0 +1,40 @@
+"""What a material law computes, and how the law of a region is found."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from glisson.core.arrays import FloatArray
+from glisson.core.model import Material
+from glisson.core.registry import make_technique
+
+
+@dataclass(frozen=True)
+class NoParameters:
+    """A law has no parameters of its own: its constants belong to the region's `Material`."""
+
+
+class Law(Protocol):
+    """Energy, stress and tangent of many deformation gradients F (n, 3, 3) at once, in kPa.
+
+    A law vanishes at F = 1, is frame-indifferent (the small-strain one excepted) and reduces to linear
+    elasticity with the material's Young's modulus and Poisson's ratio for small strain.
+    """
+
+    def energy(self, gradients: FloatArray, material: Material) -> FloatArray:
+        """Strain energy density W (n,); infinite where the law has no meaning (J ≤ 0)."""
+
+    def stress(self, gradients: FloatArray, material: Material) -> FloatArray:
+        """First Piola–Kirchhoff stress P = ∂W/∂F, (n, 3, 3)."""
+
+    def tangent(self, gradients: FloatArray, material: Material) -> FloatArray:
+        """∂P/∂F as (n, 9, 9), rows and columns being the row-major entries of P and F."""
+
+
+def find_law(name: str) -> Law:
+    """The law registered under `name` in the entry-point group `glisson.materials`.
+
+    Raises:
+        BadInput: there is no such law.
+    """
+    law: Law = make_technique("material", name, {}, f"material law {name}")
+    return law

@@ -1,0 +1,177 @@
+"""The unloaded shape: the scan shows the organ already deformed by gravity and its supports.
+
+Inverse elastostatics (Govindjee and Mihalic 1996): the deformed positions A are given, the unloaded
+positions X are the unknowns. A board that carried the organ during the scan presses with what is needed to
+keep its underside where the scan shows it: an almost rigid bed, on which the underside of X lies as that of
+A does. The pressures found are handed to the contact by shifting each surface point's gap (`offsets`) so
+that the forward model, with the same loads, is in equilibrium at A exactly.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+
+from glisson.core.arrays import FloatArray, IntArray
+from glisson.core.errors import StageFailed
+from glisson.core.mesh import TetMesh
+from glisson.core.model import Material
+from glisson.core.scenario import Board
+from glisson.core.status import Status
+from glisson.mechanics.body import scatter_blocks
+from glisson.mechanics.elasticity import Elasticity
+from glisson.mechanics.elements import SurfaceQuadrature, quadrature
+from glisson.mechanics.linear_solvers import make_factorisation
+from glisson.mechanics.pattern import FreeSystem, block_pattern, pair_slots
+
+_TOLERANCE = 1e-8
+_ITERATION_LIMIT = 60
+_BED_STIFFNESS_SHARE = 10.0  # bed stiffness in Young's moduli per mm: a weight of 0.6 kPa sinks in by 0.01 mm
+_FACING = -0.5  # a surface point lies on a board when its outward normal is turned this much towards it
+
+
+@dataclass(frozen=True, eq=False)
+class Support:
+    """A board's surface points (k,) in A and their pressures (k,) in kPa, zero where they only touch."""
+
+    points: IntArray
+    pressures: FloatArray
+    conforming: bool
+
+
+@dataclass(frozen=True, eq=False)
+class RestShape:
+    """Unloaded node positions (n, 3) in mm, and how each board carried the organ in A."""
+
+    positions: FloatArray
+    supports: Mapping[str, Support]
+
+
+@dataclass(frozen=True, eq=False)
+class _Bed:
+    """A board and the surface points that lie on it in A."""
+
+    name: str
+    normal: FloatArray
+    points: IntArray
+    stiffness: float
+    conforming: bool
+
+
+def find_rest_shape(
+    mesh: TetMesh,
+    materials: Mapping[int, Material],
+    weights: FloatArray,
+    boards: Sequence[Board],
+    surface: SurfaceQuadrature,
+    fixed: NDArray[np.bool_],
+    surface_tolerance_mm: float,
+) -> RestShape:
+    """The shape that `weights` (n, 3) in mN and the boards deform into the scanned one.
+
+    Raises:
+        StageFailed: no unloaded shape was found (the organ is too soft for its weight).
+    """
+    stiffest = max(material.young_modulus_kpa for material in materials.values())
+    beds = [_bed(board, mesh, surface, surface_tolerance_mm, _BED_STIFFNESS_SHARE * stiffest) for board in boards]
+    problem = _InverseProblem(mesh, materials, weights, beds, surface, fixed)
+    positions = problem.solve()
+    supports = {bed.name: Support(bed.points, problem.pressures(bed, positions), bed.conforming) for bed in beds}
+    return RestShape(positions, supports)
+
+
+class _InverseProblem:
+    """Residual and search for X; the forward stiffness at (X, A) stands in for the exact derivative."""
+
+    def __init__(
+        self,
+        mesh: TetMesh,
+        materials: Mapping[int, Material],
+        weights: FloatArray,
+        beds: Sequence[_Bed],
+        surface: SurfaceQuadrature,
+        fixed: NDArray[np.bool_],
+    ) -> None:
+        self._mesh, self._materials, self._weights = mesh, materials, weights
+        self._beds, self._surface, self._fixed = beds, surface, fixed
+        self._scanned_points = surface.positions(mesh.nodes)
+        self._pattern = block_pattern(mesh.tetrahedra, len(mesh.nodes))
+        self._system = FreeSystem(self._pattern, fixed.ravel())
+        self._pairs = pair_slots(self._pattern, surface.nodes)
+
+    def solve(self) -> FloatArray:
+        """X by a quasi-Newton iteration with backtracking on the residual."""
+        positions = np.array(self._mesh.nodes)
+        factorisation = make_factorisation()
+        force = self._unbalanced(positions)
+        reference = float(np.linalg.norm(self._weights))
+        try:
+            for _ in range(_ITERATION_LIMIT):
+                size = float(np.linalg.norm(force))
+                if size <= _TOLERANCE * reference:
+                    return positions
+                if not factorisation.factor(self._stiffness(positions)):
+                    break
+                step = np.zeros(force.size)
+                step[self._system.free] = factorisation.solve(-force.ravel()[self._system.free])
+                found = self._search(positions, step.reshape(force.shape), size)
+                if found is None:
+                    break
+                positions, force = found
+        finally:
+            factorisation.close()
+        raise StageFailed(
+            "No unloaded shape could be found: the organ is too soft to carry its weight in the scanned shape; "
+            'use a higher Young\'s modulus, more attachments, or rest_shape = "as-scanned".',
+            Status.STAGNATED,
+        )
+
+    def pressures(self, bed: _Bed, positions: FloatArray) -> FloatArray:
+        """Pressure (k,) in kPa of a board on its surface points."""
+        pressures: FloatArray = bed.stiffness * np.maximum(self._sinking(bed, positions), 0.0)
+        return pressures
+
+    def _sinking(self, bed: _Bed, positions: FloatArray) -> FloatArray:
+        away = self._surface.positions(positions)[bed.points] - self._scanned_points[bed.points]
+        sinking: FloatArray = away @ bed.normal
+        return sinking
+
+    def _unbalanced(self, positions: FloatArray) -> FloatArray:
+        elasticity = Elasticity(self._mesh, self._materials, positions)
+        force = self._weights - elasticity.forces(self._mesh.nodes)
+        pushes = np.zeros((len(self._surface.areas), 3))
+        for bed in self._beds:
+            forces = self.pressures(bed, positions) * self._surface.areas[bed.points]
+            pushes[bed.points] += forces[:, None] * bed.normal
+        force += self._surface.scatter(pushes, len(positions))
+        force[self._fixed] = 0.0
+        return force
+
+    def _stiffness(self, positions: FloatArray) -> csr_matrix:
+        blocks = np.zeros((self._pattern.block_count, 3, 3))
+        elasticity = Elasticity(self._mesh, self._materials, positions)
+        elasticity.add_stiffness(self._mesh.nodes, self._pattern, blocks, project=True)
+        for bed in self._beds:
+            pressed = bed.points[self._sinking(bed, positions) >= 0.0]  # all of them in A, where the search starts
+            local = (bed.stiffness * self._surface.areas[pressed])[:, None, None] * np.outer(bed.normal, bed.normal)
+            scatter_blocks(pressed, local, self._surface.shapes, self._pairs, blocks)
+        return self._system.matrix(blocks)
+
+    def _search(self, positions: FloatArray, step: FloatArray, size: float) -> tuple[FloatArray, FloatArray] | None:
+        for halving in range(12):
+            moved = positions + 0.5**halving * step
+            if float(quadrature(moved, self._mesh).weights.min()) <= 0.0:
+                continue
+            force = self._unbalanced(moved)
+            if float(np.linalg.norm(force)) < size:
+                return moved, force
+        return None
+
+
+def _bed(board: Board, mesh: TetMesh, surface: SurfaceQuadrature, tolerance_mm: float, stiffness: float) -> _Bed:
+    heights = (surface.positions(mesh.nodes) - board.point_mm) @ board.normal
+    facing = surface.normals @ board.normal < _FACING
+    near = np.abs(heights) <= (np.inf if board.conforming else tolerance_mm)
+    return _Bed(board.name, board.normal, np.flatnonzero(facing & near), stiffness, board.conforming)

@@ -1,0 +1,261 @@
+"""Takes the body through the stages of a scenario in adaptive load steps."""
+
+from dataclasses import dataclass
+from math import degrees, radians
+
+import numpy as np
+from numpy.typing import NDArray
+
+from glisson.core.arrays import FloatArray
+from glisson.core.deformation import Deformation, Event, LoadStep, StageResult
+from glisson.core.model import Model
+from glisson.core.protocols import Progress
+from glisson.core.scenario import Scenario, Stage
+from glisson.core.status import Status
+from glisson.core.units import STANDARD_GRAVITY_MM_S2, density_from_kg_m3, millinewtons_from_newtons
+from glisson.mechanics.body import Body
+from glisson.mechanics.contact_report import hinge_moment, report_contacts
+from glisson.mechanics.elements import nodal_volumes
+from glisson.mechanics.newton import Newton, NewtonEnd
+from glisson.mechanics.tools import LeverTool
+
+_SMALLEST_SHARE = 1.0 / 256.0  # of a stage: smaller load steps are not tried
+_LOAD_STEPS = 4  # for a change of gravity
+_STIFFENINGS = 6
+_FORCE_ACCURACY = 1e-3
+_LARGEST_ANGLE = radians(90.0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Target:
+    """Tool angles (rad) and dead loads (n, 3) at the end of a ramp."""
+
+    angles: tuple[float, ...]
+    external: FloatArray
+
+
+class StageRunner:
+    """Runs all stages; every load step is an equilibrium, or the run ends with a status that says why."""
+
+    def __init__(
+        self, model: Model, scenario: Scenario, body: Body, newton: Newton, step_deg: float, progress: Progress
+    ) -> None:
+        self._model, self._scenario = model, scenario
+        self._body, self._newton = body, newton
+        self._step = radians(step_deg)
+        self._progress = progress
+        self._positions = np.array(model.mesh.nodes)
+        self._record: list[LoadStep] = []
+        self._events: list[Event] = []
+        self._touched: set[str] = set()
+
+    def run(self) -> Deformation:
+        """The deformation, with the stages that were reached."""
+        results: list[StageResult] = []
+        for number, stage in enumerate(self._scenario.stages):
+            self._number = number
+            end = self._run_stage(stage)
+            contacts = report_contacts(self._body, self._positions)
+            results.append(StageResult(stage.name, self._displacement(), end.status, contacts))
+            if end.status is not Status.CONVERGED:
+                return self._deformation(results, end.status, _sentence(stage, end))
+        missed = self._never_touched()
+        if missed is not None:
+            return self._deformation(results, Status.BAD_INPUT, missed)
+        return self._deformation(results, Status.CONVERGED, Status.CONVERGED.sentence)
+
+    def _run_stage(self, stage: Stage) -> NewtonEnd:
+        body = self._body
+        body.hold(fixed_unknowns(self._model, stage.fixed))
+        body.law = stage.contact
+        gravity = self._scenario.surgery_gravity if stage.gravity else None
+        external = gravity_forces(self._model, gravity)
+        angles = [contact.angle for contact in body.contacts]
+        for drive in stage.drives:
+            if drive.angle_deg is not None:
+                angles[self._contact_number(drive.lever)] = radians(drive.angle_deg)
+        end = self._ramp(stage, _Target(tuple(angles), external))
+        for drive in stage.drives:
+            if drive.force_n is not None and end.status is Status.CONVERGED:
+                end = self._lift_by_force(stage, drive.lever, millinewtons_from_newtons(drive.force_n))
+        return end
+
+    def _ramp(self, stage: Stage, target: _Target) -> NewtonEnd:
+        """Go to the target, halving the load step where it fails and doubling it where it is easy."""
+        body = self._body
+        start = _Target(tuple(contact.angle for contact in body.contacts), body.external.copy())
+        turn = max((abs(b - a) for a, b in zip(start.angles, target.angles, strict=True)), default=0.0)
+        steps = max(int(np.ceil(turn / self._step - 1e-9)), 1)
+        if np.linalg.norm(target.external - start.external) > 1e-9 * np.linalg.norm(target.external):
+            steps = max(steps, _LOAD_STEPS)
+        done, share = 0.0, 1.0 / steps
+        while done < 1.0:
+            reach = min(done + share, 1.0)
+            self._progress((self._number + reach) / len(self._scenario.stages), self._words(stage))
+            end = self._load_step(_between(start, target, reach))
+            if end.status is Status.CONVERGED:
+                done = 1.0 if reach > 1.0 - 1e-9 else reach
+                self._accept(stage, done, end)
+                share = min(share * 1.5, 1.0 / steps)
+            elif end.status is Status.SINGULAR or share / 2.0 < _SMALLEST_SHARE / steps:
+                self._note(stage, reach, end)
+                return end
+            else:
+                share /= 2.0
+        return end
+
+    def _load_step(self, goal: _Target) -> NewtonEnd:
+        """Equilibrium at the goal; tools, loads and anchors are put back where it is not reached."""
+        body = self._body
+        memories = [contact.memory() for contact in body.contacts]
+        external = body.external
+        moved = self._positions + self._newton.predict(self._positions, goal.angles, goal.external)
+        for contact, angle in zip(body.contacts, goal.angles, strict=True):
+            contact.angle = angle
+        body.external = goal.external
+        if np.isfinite(body.elasticity.energy(moved)):
+            end = self._without_penetration(self._newton.solve(moved))
+        else:
+            end = NewtonEnd(self._positions, Status.INVERTED, 0, float("nan"))
+        if end.status is not Status.CONVERGED:
+            for contact, memory in zip(body.contacts, memories, strict=True):
+                contact.recall(memory)
+            body.external = external
+        return end
+
+    def _without_penetration(self, end: NewtonEnd) -> NewtonEnd:
+        """Stiffen the cushions and solve again as long as a surface point lies inside a tool."""
+        body = self._body
+        for _ in range(_STIFFENINGS):
+            if end.status is not Status.CONVERGED:
+                return end
+            touches = body.touches(end.positions, update_friction=False)
+            deep = [touch.gaps.size > 0 and float(touch.gaps.min()) <= 0.0 for touch in touches]
+            if not any(deep):
+                return end
+            for contact, is_deep in zip(body.contacts, deep, strict=True):
+                if is_deep:
+                    contact.cushion = contact.cushion.stiffened(2.0)
+            again = self._newton.solve(end.positions)
+            end = NewtonEnd(
+                again.positions, again.status, end.iterations + again.iterations, again.residual, again.reason
+            )
+        return NewtonEnd(end.positions, Status.STAGNATED, end.iterations, end.residual, "a tool stays inside the organ")
+
+    def _accept(self, stage: Stage, reach: float, end: NewtonEnd) -> None:
+        body = self._body
+        self._positions = end.positions
+        points = body.surface.positions(end.positions)
+        for contact in body.contacts:
+            contact.drag_anchors(points)
+        self._note(stage, reach, end)
+        for contact, touch in zip(body.contacts, body.touches(end.positions, update_friction=False), strict=True):
+            name, touching = contact.tool.name, bool(len(touch.points))
+            if isinstance(contact.tool, LeverTool) and name in self._touched and not touching:
+                self._touched.discard(name)
+                self._events.append(Event("lost_contact", name, degrees(contact.angle)))
+            if touching:
+                self._touched.add(name)
+
+    def _lift_by_force(self, stage: Stage, lever: str, force_mn: float) -> NewtonEnd:
+        """Turn the lever until the organ's moment about the hinge balances a force on the lever's end."""
+        body = self._body
+        number = self._contact_number(lever)
+        contact = body.contacts[number]
+        assert isinstance(contact.tool, LeverTool)  # the scenario was validated
+        wanted = force_mn * contact.tool.lever.length_mm
+        end = NewtonEnd(self._positions, Status.CONVERGED, 0, 0.0)
+        turn, slope, missing = self._step, 0.0, wanted - self._moment(number)
+        while missing > _FORCE_ACCURACY * wanted:
+            angle = contact.angle
+            if angle + turn > _LARGEST_ANGLE:
+                reason = f"the organ does not resist the force on {lever!r}: the lever turned beyond 90°"
+                return NewtonEnd(self._positions, Status.STAGNATED, end.iterations, end.residual, reason)
+            goal = [c.angle for c in body.contacts]
+            goal[number] = angle + turn
+            before, memories = self._positions, [c.memory() for c in body.contacts]
+            end = self._load_step(_Target(tuple(goal), body.external))
+            if end.status is Status.CONVERGED:
+                reached = wanted - self._moment(number, end.positions)
+                if reached >= -_FORCE_ACCURACY * wanted:
+                    slope, missing = (missing - reached) / turn, reached
+                    self._accept(stage, 1.0 - missing / wanted, end)
+                    turn = self._step if slope <= 0.0 else min(self._step, max(missing / slope, 1e-6))
+                    continue
+                # Too far: go back, so that friction sees a lever that only ever rises.
+                slope = (missing - reached) / turn
+                self._positions = before
+                for c, memory in zip(body.contacts, memories, strict=True):
+                    c.recall(memory)
+                turn = max(0.99 * missing / slope, 0.1 * turn)
+            elif end.status is Status.SINGULAR or turn < 1e-5:
+                return end
+            else:
+                turn /= 2.0
+        return end
+
+    def _moment(self, number: int, positions: FloatArray | None = None) -> float:
+        return hinge_moment(self._body, number, self._positions if positions is None else positions)
+
+    def _contact_number(self, name: str) -> int:
+        return next(n for n, contact in enumerate(self._body.contacts) if contact.tool.name == name)
+
+    def _never_touched(self) -> str | None:
+        """A sentence about a driven lever that missed the organ in every load step."""
+        driven = {drive.lever for stage in self._scenario.stages for drive in stage.drives}
+        lost = {event.tool for event in self._events}
+        for name in sorted(driven - self._touched - lost):
+            contact = self._body.contacts[self._contact_number(name)]
+            gap = float(contact.gaps(self._body.surface.positions(self._positions)).min())
+            return (
+                f"Lever {name!r} never touched the organ: at {degrees(contact.angle):.0f}° it still is {gap:.1f} mm "
+                "away; move its hinge, lengthen it or turn it further."
+            )
+        return None
+
+    def _note(self, stage: Stage, reach: float, end: NewtonEnd) -> None:
+        energy = self._body.energy(end.positions)
+        self._record.append(LoadStep(stage.name, reach, end.iterations, end.residual, energy, end.status))
+
+    def _words(self, stage: Stage) -> str:
+        angles = [f"{degrees(c.angle):.0f}°" for c in self._body.contacts if isinstance(c.tool, LeverTool)]
+        return f"{stage.name}: lever at {', '.join(angles)}" if angles else stage.name
+
+    def _displacement(self) -> FloatArray:
+        return self._positions - self._model.mesh.nodes
+
+    def _deformation(self, stages: list[StageResult], status: Status, message: str) -> Deformation:
+        return Deformation(self._model.mesh, tuple(stages), status, message, tuple(self._record), tuple(self._events))
+
+
+def gravity_forces(model: Model, direction: FloatArray | None) -> FloatArray:
+    """Weight of the scanned shape as nodal forces (n, 3) in mN along a unit direction (None: weightless)."""
+    if direction is None:
+        return np.zeros_like(model.mesh.nodes)
+    densities = {n: density_from_kg_m3(m.density_kg_m3) for n, m in model.materials.items()}
+    factors = np.array([densities[int(region)] for region in model.mesh.region_numbers])
+    masses = nodal_volumes(model.mesh.nodes, model.mesh, factors)
+    weights: FloatArray = masses[:, None] * STANDARD_GRAVITY_MM_S2 * direction
+    return weights
+
+
+def fixed_unknowns(model: Model, names: tuple[str, ...]) -> NDArray[np.bool_]:
+    """Which unknowns (n, 3) the named node sets hold.
+
+    Raises:
+        BadInput: the model has no such set.
+    """
+    fixed = np.zeros(model.mesh.nodes.shape, dtype=bool)
+    for name in names:
+        fixed[model.node_set(name)] = True
+    return fixed
+
+
+def _between(start: _Target, goal: _Target, share: float) -> _Target:
+    angles = tuple(a + share * (b - a) for a, b in zip(start.angles, goal.angles, strict=True))
+    return _Target(angles, start.external + share * (goal.external - start.external))
+
+
+def _sentence(stage: Stage, end: NewtonEnd) -> str:
+    reason = end.reason or end.status.sentence.rstrip(".").lower()
+    return f"Stage {stage.name!r} did not reach equilibrium (relative residual {end.residual:.1e}): {reason}."

@@ -1,0 +1,101 @@
+"""Rigid tools as signed distances: gap, normal and curvature at points given in the tool's frame."""
+
+from typing import Protocol
+
+import numpy as np
+from numba import njit
+
+from glisson.core.arrays import FloatArray
+from glisson.core.scenario import Board, Lever
+
+
+class RigidTool(Protocol):
+    """A rigid body and its motion.
+
+    The tool's frame is fixed to the tool; `pose(angle)` gives `patient_from_tool` (rotation and
+    translation) at an angle in radians.
+    """
+
+    name: str
+
+    def pose(self, angle: float) -> tuple[FloatArray, FloatArray]:
+        """Rotation (3, 3) and translation (3,) in mm that take tool points to the patient frame."""
+
+    def distance(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Signed distance (n,) mm of tool-frame points (n, 3), its gradient (n, 3) and Hessian (n, 3, 3)."""
+
+
+class BoardTool:
+    """A half-space: the organ is on the side of the normal."""
+
+    def __init__(self, board: Board) -> None:
+        self.name = board.name
+        self._board = board
+
+    def pose(self, angle: float) -> tuple[FloatArray, FloatArray]:
+        """A board does not move: its frame has the patient's axes and starts at its point."""
+        return np.eye(3), self._board.point_mm
+
+    def distance(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Height over the board; a plane has no curvature."""
+        count = len(points)
+        normals = np.tile(self._board.normal, (count, 1))
+        return points @ self._board.normal, normals, np.zeros((count, 3, 3))
+
+
+class LeverTool:
+    """A bar with rounded edges. Tool axes: arm, up and axis of the lever; origin: the bar's centre line start."""
+
+    def __init__(self, lever: Lever) -> None:
+        self.name = lever.name
+        self.lever = lever
+        self._half = np.array([lever.length_mm, lever.thickness_mm, lever.width_mm]) / 2.0
+        self._centre = np.array([lever.length_mm / 2.0, -lever.thickness_mm / 2.0, 0.0])
+        self._axes = np.stack([lever.arm, lever.up, np.cross(lever.arm, lever.up)], axis=1)
+
+    def pose(self, angle: float) -> tuple[FloatArray, FloatArray]:
+        """The bar turned about the hinge so that positive angles move the tip towards `up`."""
+        turn = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
+        return self._axes @ turn, self.lever.hinge_mm
+
+    def distance(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Distance to the box with its edges rounded by `edge_radius_mm`."""
+        inner = self._half - self.lever.edge_radius_mm
+        result: tuple[FloatArray, FloatArray, FloatArray] = _rounded_box(
+            points - self._centre, inner, self.lever.edge_radius_mm
+        )
+        return result
+
+
+def make_tool(tool: Board | Lever) -> RigidTool:
+    """The distance function of a scenario's tool."""
+    return BoardTool(tool) if isinstance(tool, Board) else LeverTool(tool)
+
+
+@njit(cache=True)
+def _rounded_box(points: FloatArray, inner: FloatArray, radius: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """A box of half sizes `inner` grown by `radius`: a point's distance to the inner box less the radius."""
+    count = len(points)
+    distances, normals, hessians = np.zeros(count), np.zeros((count, 3)), np.zeros((count, 3, 3))
+    for n in range(count):
+        beyond = np.abs(points[n]) - inner
+        outside = 0.0
+        for i in range(3):
+            if beyond[i] > 0.0:
+                outside += beyond[i] ** 2
+        if outside == 0.0:  # deep inside: the nearest face counts
+            axis = np.argmax(beyond)
+            distances[n] = beyond[axis] - radius
+            normals[n, axis] = np.sign(points[n, axis]) if points[n, axis] != 0.0 else 1.0
+            continue
+        reach = np.sqrt(outside)
+        distances[n] = reach - radius
+        for i in range(3):
+            if beyond[i] > 0.0:
+                normals[n, i] = np.sign(points[n, i]) * beyond[i] / reach
+        for i in range(3):
+            for j in range(3):
+                if beyond[i] > 0.0 and beyond[j] > 0.0:
+                    unit = 1.0 if i == j else 0.0
+                    hessians[n, i, j] = (unit - normals[n, i] * normals[n, j]) / reach
+    return distances, normals, hessians
