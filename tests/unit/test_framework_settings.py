@@ -99,4 +99,4 @@ def test_parameters_are_checked_when_the_technique_is_made(monkeypatch: pytest.M
 
     monkeypatch.setattr(settings_module, "technique_class", known)
     with pytest.raises(BadInput, match=r"case\.toml: mesh \(ftetwild\).*edge_lenght"):
-        parsed("[mesh]\nedge_lenght_mm = 3").choices["mesh"].all_parameters("case.toml")
+        parsed("[mesh]\nedge_lenght_mm = 3").choices["mesh"].all_parameters("case.toml", 0)

@@ -24,7 +24,7 @@ def content_hash(path: Path) -> str:
 
 @cache
 def source_hash(*packages: str) -> str:
-    """Hash of the Python source of packages or modules by their import names ("glisson.core", …)."""
+    """Hash of the source and data files of packages or modules by their import names ("glisson.core", …)."""
     digest = hashlib.blake2b(digest_size=16)
     for name in packages:
         file = import_module(name).__file__
@@ -32,8 +32,9 @@ def source_hash(*packages: str) -> str:
             continue
         module = Path(file)
         root = module.parent if module.name == "__init__.py" else module
-        for entry in sorted(root.rglob("*.py")) if root.is_dir() else [root]:
-            digest.update(entry.relative_to(root.parent).as_posix().encode() + b"\0" + _file_digest(entry))
+        for entry in sorted(root.rglob("*")) if root.is_dir() else [root]:
+            if entry.is_file() and "__pycache__" not in entry.parts:
+                digest.update(entry.relative_to(root.parent).as_posix().encode() + b"\0" + _file_digest(entry))
     return f"{_NAME}:{digest.hexdigest()}"
 
 

@@ -150,7 +150,8 @@ def _current(
 ) -> tuple[float, StageRecord | None]:
     """Run a stage unless it is current; seconds and record (None where a person gave the outputs)."""
     found = stage_state(stage, case, settings)
-    if found.state is State.CURRENT or (found.state is State.GIVEN and not replace):
+    kept = found.state is State.GIVEN and not (replace or stage.works_on_given(settings))
+    if found.state is State.CURRENT or kept:
         heard.skipped(stage.name, found.reason)
         return 0.0, found.record
     progress = heard.begun(stage.name, found.reason)
@@ -162,14 +163,15 @@ def _current(
     facts = stage.run(case, settings, work, progress)
     seconds = time.perf_counter() - started
     outputs = {name: content_hash(work / name) for name in stage.outputs}
-    record = record_of(stage.name, basis, outputs, facts, seconds)
+    record = record_of(stage.name, basis, outputs, facts, seconds, settings.seed)
     (work / stage.record_name).write_text(record.text(), encoding="utf-8")
     moves = [(work / name, case.path(name)) for name in (*stage.outputs, stage.record_name)]
     if settings != case.settings():
         moves.append(_staged_settings(case, settings))
     if found.state is State.GIVEN:
         given = [case.path(name) for name in stage.outputs if case.has(name)]
-        moves = [(place, place.with_name(f"previous-{place.name}")) for place in given] + moves
+        lost = [place for place in given if content_hash(place) not in outputs.values()]
+        moves = [(place, place.with_name(f"previous-{place.name}")) for place in lost] + moves
     _put_in_place(moves, work)
     shutil.rmtree(work, ignore_errors=True)
     heard.ended(stage.name, seconds)

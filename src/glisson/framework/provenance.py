@@ -29,7 +29,6 @@ class Basis:
     settings: Mapping[str, Any]
     techniques: Mapping[str, Mapping[str, str | None]]
     source: str
-    seed: int
 
     def difference(self, other: "Basis") -> str | None:
         """What differs, in a few words for people; None when nothing does."""
@@ -41,7 +40,6 @@ class Basis:
         for part, words in (
             ("settings", "its settings changed"),
             ("techniques", "the technique's code or version changed"),
-            ("seed", "the seed changed"),
             ("source", "Glisson itself changed"),
         ):
             if getattr(self, part) != getattr(other, part):
@@ -58,8 +56,14 @@ class StageRecord:
     outputs: Mapping[str, str]
     facts: Mapping[str, Any]
     seconds: float
+    seed: int
     finished: str
     versions: Mapping[str, str | None]
+
+    def summary(self) -> dict[str, Any]:
+        """What a report shows of it: techniques, settings, hashes, code, versions, time."""
+        shown = asdict(self.basis) | {"outputs": dict(self.outputs), "versions": dict(self.versions)}
+        return shown | {"seed": self.seed, "seconds": self.seconds, "finished": self.finished}
 
     def text(self) -> str:
         """The record as JSON."""
@@ -67,12 +71,12 @@ class StageRecord:
 
 
 def record_of(
-    stage: str, basis: Basis, outputs: Mapping[str, str], facts: Mapping[str, Any], seconds: float
+    stage: str, basis: Basis, outputs: Mapping[str, str], facts: Mapping[str, Any], seconds: float, seed: int
 ) -> StageRecord:
     """A record of a run that ended now, with the versions in use."""
     versions = {"python": platform.python_version(), **{name: package_version(name) for name in KEY_PACKAGES}}
     finished = datetime.now(UTC).isoformat(timespec="seconds")
-    return StageRecord(stage, basis, outputs, facts, round(seconds, 3), finished, versions)
+    return StageRecord(stage, basis, outputs, facts, round(seconds, 3), seed, finished, versions)
 
 
 def read_record(path: Path) -> StageRecord | None:
@@ -94,7 +98,6 @@ def basis_of(
     settings: Mapping[str, Any],
     techniques: Sequence[tuple[str, str]],
     packages: Sequence[str],
-    seed: int,
 ) -> Basis:
     """What a stage would rest on if it ran now; inputs that are absent in `folder` are left out.
 
@@ -104,7 +107,6 @@ def basis_of(
         settings: what the stage takes from the settings, plain values.
         techniques: kind and name of each technique that is used.
         packages: our packages on whose source the stage rests, by import name.
-        seed: of the random numbers.
 
     Raises:
         BadInput: a technique cannot be used.
@@ -112,7 +114,7 @@ def basis_of(
     hashes = {name: content_hash(folder / name) for name in inputs if (folder / name).exists()}
     used = {f"{kind} {name}": _technique(kind, name) for kind, name in techniques}
     # The detour through JSON makes tuples lists, as they are when a record is read back.
-    return Basis(hashes, json.loads(json.dumps(settings)), used, source_hash(*packages), seed)
+    return Basis(hashes, json.loads(json.dumps(settings)), used, source_hash(*packages))
 
 
 def _technique(kind: str, name: str) -> dict[str, str | None]:

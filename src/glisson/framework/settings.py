@@ -4,14 +4,18 @@ There is no field for free text, so nothing here can identify a patient.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
 from typing import Any
 
 from glisson.core.errors import BadInput
 from glisson.core.model import Material
 from glisson.core.parameters import build_parameters, parameter
-from glisson.core.registry import make_technique, technique_class
+from glisson.core.registry import technique_class
+from glisson.preoperative.attachments import DEFAULT_ATTACHMENTS, Attachment
+from glisson.preoperative.manoeuvre import LeverLiftParameters
+from glisson.preoperative.model_building import HUMAN_LIVER
+from glisson.preoperative.regions import ORGAN
 
 SCHEMA = 1
 """Version of the case folder that this Glisson writes, and the newest that it reads."""
@@ -19,10 +23,10 @@ SCHEMA = 1
 KINDS = {"segment": "segmenter", "surface": "surface-extractor", "mesh": "mesher", "simulate": "solver"}
 """Section of `case.toml` → kind of the technique that is chosen there."""
 
-Point = tuple[float, float, float]
+GIVEN_LABELS = "labels"
+"""The segmenter that takes a label map that was given."""
 
-DEFAULT_MATERIAL = Material("neo-hookean", young_modulus_kpa=7.0, poisson_ratio=0.45, density_kg_m3=1060.0)
-"""Soft liver in the range of the elastographies that the dissertation cites (6 to 13 kPa)."""
+Point = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -41,18 +45,21 @@ class TechniqueChoice:
         """Kind of technique that the section takes."""
         return KINDS[self.section]
 
-    def all_parameters(self, where: str) -> Any:
+    def all_parameters(self, where: str, seed: int) -> Any:
         """The parameters with the technique's defaults, an instance of its `Parameters`.
+
+        A technique that has a parameter named `seed` gets the case's, unless one was set for it.
 
         Raises:
             BadInput: the technique cannot be used, or a parameter does not fit it.
         """
-        made = technique_class(self.kind, self.technique)
-        return build_parameters(made.Parameters, self.parameters, f"{where}: {self.section} ({self.technique})")
+        kind = technique_class(self.kind, self.technique).Parameters
+        seeded = {"seed": seed} if "seed" in {field.name for field in fields(kind)} else {}
+        return build_parameters(kind, seeded | dict(self.parameters), f"{where}: {self.section} ({self.technique})")
 
-    def make(self, where: str) -> Any:
+    def make(self, where: str, seed: int) -> Any:
         """The technique, ready for work; raises as `all_parameters`."""
-        return make_technique(self.kind, self.technique, self.parameters, f"{where}: {self.section} ({self.technique})")
+        return technique_class(self.kind, self.technique)(self.all_parameters(where, seed))
 
 
 @dataclass(frozen=True)
@@ -74,11 +81,13 @@ class PlaneSettings:
     )
 
 
-SECTIONS: Mapping[str, type[Any]] = MappingProxyType({"segment": SegmentSettings, "plane": PlaneSettings})
+SECTIONS: Mapping[str, type[Any]] = MappingProxyType(
+    {"segment": SegmentSettings, "plane": PlaneSettings, "scenario": LeverLiftParameters}
+)
 """Section of `case.toml` → dataclass of the keys that are ours there, beside those of a technique."""
 
 DEFAULT_TECHNIQUES = MappingProxyType(
-    {"segment": "seeded-contour", "surface": "marching-cubes", "mesh": "ftetwild", "simulate": "quasi-static"}
+    {"segment": "labels", "surface": "marching-cubes", "mesh": "ftetwild", "simulate": "quasi-static"}
 )
 """Section of `case.toml` → technique that is used where none was chosen."""
 
@@ -88,14 +97,16 @@ class Settings:
     """Everything that `case.toml` holds.
 
     `choices` has one technique for each section of `KINDS`; `materials` is by the name of the region
-    ("liver", "tumours"); `target` is the tumour to remove (None: the largest one); `seed` is that of
-    every random number.
+    ("liver", one tumour's name, or "tumours" for all others); `attachments` hold the organ; `target` is
+    the tumour to remove (None: the largest one); `seed` is that of every random number.
     """
 
     choices: Mapping[str, TechniqueChoice] = field(default_factory=dict)
-    materials: Mapping[str, Material] = field(default_factory=lambda: {"liver": DEFAULT_MATERIAL})
+    materials: Mapping[str, Material] = field(default_factory=lambda: {ORGAN: HUMAN_LIVER})
+    attachments: tuple[Attachment, ...] = DEFAULT_ATTACHMENTS
     segment: SegmentSettings = field(default_factory=SegmentSettings)
     plane: PlaneSettings = field(default_factory=PlaneSettings)
+    scenario: LeverLiftParameters = field(default_factory=LeverLiftParameters)
     target: str | None = None
     seed: int = 0
 

@@ -1,6 +1,6 @@
 """`case.toml`: settings from its table, and its text with comments that tell people what can be changed."""
 
-from collections.abc import Mapping, MutableMapping
+from collections.abc import Mapping, MutableMapping, Sequence
 from dataclasses import MISSING, asdict, fields
 from typing import Any
 
@@ -12,7 +12,6 @@ from glisson.core.model import Material
 from glisson.core.parameters import build_parameters, range_phrase
 from glisson.core.registry import technique_class
 from glisson.framework.settings import (
-    DEFAULT_MATERIAL,
     DEFAULT_TECHNIQUES,
     KINDS,
     SCHEMA,
@@ -20,6 +19,9 @@ from glisson.framework.settings import (
     Settings,
     TechniqueChoice,
 )
+from glisson.preoperative.attachments import DEFAULT_ATTACHMENTS, Attachment, BoxAttachment, attachments_from_tables
+from glisson.preoperative.model_building import HUMAN_LIVER
+from glisson.preoperative.regions import ORGAN
 
 _HEAD = """\
 # A Glisson case; docs/case-folder.md says more. Lengths in mm, stresses in kPa, densities in kg/m³, points LPS.
@@ -37,6 +39,7 @@ _ABOUT = {
     "mesh": "The tetrahedra inside the surface.",
     "simulate": "The solver of the manoeuvre that scenario.toml describes.",
     "plane": "The resection plane; the side of the target is removed.",
+    "scenario": "The manoeuvre that is proposed where nobody wrote or changed scenario.toml.",
 }
 
 
@@ -48,7 +51,7 @@ def settings_from_table(table: Mapping[str, Any], where: str) -> Settings:
             parameters are checked when the technique is made, since that may load a plug-in.
     """
     sections = sorted({*KINDS, *SECTIONS, "materials"})
-    known = ["schema", "seed", "target", *sections]
+    known = ["schema", "seed", "target", *sections, "attachments"]
     unknown = sorted(set(table) - set(known))
     if unknown:
         raise BadInput(f"{where} does not know {unknown}; it has {known}.")
@@ -61,7 +64,8 @@ def settings_from_table(table: Mapping[str, Any], where: str) -> Settings:
     given = {name: _subtable(table, name, where) for name in sections}
     choices = {name: _choice(name, given[name], where) for name in KINDS}
     own = {name: _own_section(name, given[name], where) for name in SECTIONS}
-    return Settings(choices, _materials(given["materials"], where), target=target, seed=seed, **own)
+    materials, attachments = _materials(given["materials"], where), _attachments(table, where)
+    return Settings(choices, materials, attachments, target=target, seed=seed, **own)
 
 
 def settings_table(settings: Settings) -> dict[str, Any]:
@@ -76,6 +80,7 @@ def settings_table(settings: Settings) -> dict[str, Any]:
         if section:
             table[name] = section
     table["materials"] = {name: asdict(material) for name, material in settings.materials.items()}
+    table["attachments"] = _attachment_tables(settings.attachments)
     return table
 
 
@@ -85,9 +90,9 @@ def settings_text(settings: Settings, previous: str | None = None) -> str:
         sections = [_section_text(settings, name) for name in _ordered_sections()]
         target = "# target =" if settings.target is None else _assignment("target", settings.target)
         head = _HEAD.format(schema=SCHEMA, seed=settings.seed, target=target)
-        return "\n".join([head, *sections, _materials_text(settings)])
+        return "\n".join([head, *sections, _materials_text(settings), _attachments_text(settings)])
     document = tomlkit.parse(previous)
-    _update(document, settings_table(settings_from_table(document, "case.toml")), settings_table(settings))
+    _update(document, settings_table(settings_from_table(document.unwrap(), "case.toml")), settings_table(settings))
     return tomlkit.dumps(document)
 
 
@@ -127,11 +132,27 @@ def _materials(given: Mapping[str, Any], where: str) -> dict[str, Material]:
         if not isinstance(values, Mapping):
             raise BadInput(f"{path} must be a table, written [materials.{region}].")
         try:
-            materials[region] = build_parameters(Material, {**asdict(DEFAULT_MATERIAL), **values}, path)
+            materials[region] = build_parameters(Material, {**asdict(HUMAN_LIVER), **values}, path)
         except BadInput as error:
             sentence = str(error)
             raise BadInput(sentence if sentence.startswith(path) else f"{path}: {sentence}") from None
-    return {"liver": DEFAULT_MATERIAL} | materials
+    return {ORGAN: HUMAN_LIVER} | materials
+
+
+def _attachments(table: Mapping[str, Any], where: str) -> tuple[Attachment, ...]:
+    if "attachments" not in table:
+        return DEFAULT_ATTACHMENTS
+    given = table["attachments"]
+    if not isinstance(given, list) or not all(isinstance(entry, Mapping) for entry in given):
+        raise BadInput(f"{where}: attachments must be a list of tables, each written [[attachments]].")
+    return attachments_from_tables(given, f"{where}: attachments")
+
+
+def _attachment_tables(attachments: Sequence[Attachment]) -> list[dict[str, Any]]:
+    return [
+        {"kind": "box" if isinstance(entry, BoxAttachment) else "direction", **_plain(asdict(entry))}
+        for entry in attachments
+    ]
 
 
 def _technique_values(settings: Settings, name: str) -> dict[str, Any]:
@@ -180,6 +201,15 @@ def _materials_text(settings: Settings) -> str:
         f"[materials.{tomlkit.key(region).as_string()}]\n" + tomli_w.dumps(asdict(material))
         for region, material in settings.materials.items()
     ]
+    return about + "\n".join(tables)
+
+
+def _attachments_text(settings: Settings) -> str:
+    about = (
+        "# What holds the organ: surface nodes furthest along some directions (left, right, posterior, anterior,\n"
+        '# superior, inferior), or those in a box: kind = "box", low_mm = [x, y, z], high_mm = [x, y, z].\n'
+    )
+    tables = [tomli_w.dumps({"attachments": [table]}) for table in _attachment_tables(settings.attachments)]
     return about + "\n".join(tables)
 
 

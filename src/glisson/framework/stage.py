@@ -19,7 +19,8 @@ class Stage(ABC):
     """One step from the scan to the report. Paths are relative to the case folder.
 
     `packages` are those of ours on whose source the result rests. Where a person may make or correct the
-    outputs by hand (`editable`), outputs that the stage did not make itself are kept.
+    outputs by hand (`editable`), outputs that the stage did not make itself are kept, unless it
+    `works_on_given` ones.
     """
 
     name: ClassVar[str]
@@ -35,6 +36,10 @@ class Stage(ABC):
     def techniques(self, settings: Settings) -> Sequence[tuple[str, str]]:
         """Kind and name of each technique that the stage uses."""
         return ()
+
+    def works_on_given(self, settings: Settings) -> bool:
+        """Whether outputs that a person gave are what the stage starts from, to check and clean them."""
+        return False
 
     @abstractmethod
     def run(self, case: Case, settings: Settings, out: Path, progress: Progress) -> Mapping[str, Any]:
@@ -62,7 +67,6 @@ class Stage(ABC):
             self.settings(settings),
             self.techniques(settings),
             ("glisson.core", "glisson.geometry", "glisson.io", *self.packages),
-            settings.seed,
         )
 
 

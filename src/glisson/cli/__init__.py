@@ -1,0 +1,1 @@
+"""The command `glisson`: one file for each command, no numerics."""

@@ -1,0 +1,51 @@
+"""Who hears what: machines read one JSON object on stdout, people read stderr, libraries are kept off stdout."""
+
+import json
+import os
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from typing import Any, TextIO
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a command has to say: `values` for machines, `text` for people, and the exit code."""
+
+    values: Mapping[str, Any]
+    text: str = ""
+    exit_code: int = 0
+
+
+@contextmanager
+def private_stdout() -> Iterator[TextIO]:
+    """The real stdout for the answer; whatever else writes to stdout meanwhile goes to stderr.
+
+    This holds for C++ libraries too: it is the file descriptor that is turned round.
+    """
+    sys.stdout.flush()
+    try:
+        kept = os.dup(1)
+    except OSError:  # started with stdout closed
+        yield sys.stdout
+        return
+    previous = sys.stdout
+    os.dup2(2, 1)
+    with os.fdopen(kept, "w", encoding="utf-8", errors="backslashreplace") as answers:
+        try:
+            sys.stdout = sys.stderr
+            yield answers
+            answers.flush()
+        finally:
+            sys.stdout = previous
+            with suppress(OSError):
+                os.dup2(answers.fileno(), 1)
+
+
+def tell(answer: Answer, as_json: bool, stdout: TextIO) -> None:
+    """Print an answer: with `as_json` one object on `stdout` and the text on stderr, else the text on `stdout`."""
+    if as_json:
+        stdout.write(json.dumps(answer.values, allow_nan=False, ensure_ascii=False) + "\n")
+    if answer.text:
+        (sys.stderr if as_json else stdout).write(answer.text.rstrip("\n") + "\n")

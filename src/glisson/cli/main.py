@@ -1,0 +1,144 @@
+"""Entry point of `glisson`: reads the command line, runs a command, and turns every outcome into an exit code.
+
+Exit codes: 0 good; 1 a stage failed or did not converge; 2 bad usage or bad input; 130 interrupted.
+"""
+
+import argparse
+import os
+import re
+import sys
+import traceback
+from collections.abc import Sequence
+from contextlib import redirect_stdout
+from importlib import import_module
+from typing import NoReturn, TextIO
+
+import glisson
+from glisson.cli.command import Command
+from glisson.cli.console import Answer, private_stdout, tell
+from glisson.cli.progress import StageLines
+from glisson.core.errors import BadInput, GlissonError, StageFailed
+from glisson.core.status import Status
+
+COMMANDS = {
+    "demo": "run the whole way on the phantom that ships with Glisson",
+    "new": "make a case folder from a scan and label maps; nothing that identifies the patient is copied",
+    "segment": "find the liver in the scan, or check and clean a label map that was given",
+    "mesh": "build the liver's model: surface, tetrahedra, materials, attachments, structures",
+    "simulate": "compute what scenario.toml does to the liver (runs the stages before it where they are out of date)",
+    "navigate": "tell where tumours, planes and volumes are now (runs the stages before it where they are out of date)",
+    "report": "write the report (runs the stages before it where they are out of date)",
+    "run": "bring a case up to date, from the scan to the report",
+    "techniques": "list the techniques of each kind, with the package that offers them",
+    "doctor": "check the installation and say what is missing",
+}
+"""Name of each command, in a module of that name → what it does."""
+
+_INTERRUPTED = 130  # 128 + SIGINT, as shells count
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        raise BadInput(f"{message[:1].upper()}{message[1:]}; see {self.prog} --help.")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run `glisson` with these arguments (those of the process by default) and give its exit code."""
+    words = _with_negative_values(sys.argv[1:] if arguments is None else arguments)
+    with private_stdout() as stdout:
+        answer = _answer(words, stdout)
+        tell(answer, "--json" in words, stdout)
+        return answer.exit_code
+
+
+def _answer(words: Sequence[str], stdout: TextIO) -> Answer:
+    """The answer of a command, whatever happens in it."""
+    command = _command(next((word for word in words if not word.startswith("-")), ""))
+    lines = StageLines()
+    try:
+        with redirect_stdout(stdout):
+            arguments = _parser(command).parse_args(words)
+        assert command is not None  # the parser asks for one
+        return command.run(arguments, lines)
+    except SystemExit:  # after --help and --version
+        return Answer({})
+    except BaseException as error:
+        lines.close()
+        if "--debug" in words or os.environ.get("GLISSON_DEBUG"):
+            traceback.print_exc()
+        return _failure(error, lines.stage, command)
+
+
+def _failure(error: BaseException, stage: str | None, command: Command | None) -> Answer:
+    status: Status | None = None
+    exit_code = 1
+    message = str(error)
+    if isinstance(error, KeyboardInterrupt):
+        where = "" if stage is None else f" in the stage {stage}; the case is as it was before that stage"
+        message, exit_code = f"Interrupted{where}.", _INTERRUPTED
+    elif isinstance(error, StageFailed):
+        status = error.status
+    elif isinstance(error, GlissonError):
+        exit_code = error.exit_code
+        status = Status.BAD_INPUT if isinstance(error, BadInput) else None
+    elif isinstance(error, MemoryError):
+        message = "There is not enough memory; use a coarser mesh or close other programs."
+    elif isinstance(error, OSError) and error.filename is not None:
+        message = f"{error.filename}: {error.strerror}."
+    elif isinstance(error, Exception):
+        message = (
+            f"Glisson failed in a way that was not foreseen ({type(error).__name__}: {' '.join(message.split())}); "
+            "please report it with what --debug shows."
+        )
+    else:
+        raise error
+    values = dict.fromkeys(command.keys if command else ()) | {"status": status, "message": message, "stage": stage}
+    return Answer(values, f"glisson: {message}", exit_code)
+
+
+def _command(name: str) -> Command | None:
+    if name not in COMMANDS:
+        return None
+    made: Command = import_module(f"glisson.cli.{name}").COMMAND
+    return made
+
+
+def _parser(chosen: Command | None) -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="glisson",
+        description="Computational image-based guidance for precision laparoscopy. Research software, not for "
+        "clinical use.",
+        allow_abbrev=False,
+    )
+    parser.add_argument("--version", action="version", version=f"glisson {glisson.__version__}")
+    subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)
+    for name, summary in COMMANDS.items():
+        made = subparsers.add_parser(
+            name,
+            help=summary,
+            description=summary,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+            allow_abbrev=False,
+        )
+        made.add_argument("--json", action="store_true", help="print one JSON object on stdout, all else on stderr")
+        made.add_argument("--debug", action="store_true", help="show where an unforeseen error came from")
+        if chosen is not None and name == chosen.name:
+            # Only then: the options of techniques come from their classes, which take seconds to load.
+            made.epilog = f"examples:\n{chosen.examples}"
+            chosen.add_arguments(made)
+    return parser
+
+
+def _with_negative_values(words: Sequence[str]) -> list[str]:
+    """Join "--seed-point -10,20,30" with "=", since a list that begins with "-" looks like an option."""
+    joined: list[str] = []
+    for word in words:
+        if joined and re.fullmatch(r"--[^=]+", joined[-1]) and re.match(r"-[\d.]", word):
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
+
+
+if __name__ == "__main__":
+    sys.exit(main())

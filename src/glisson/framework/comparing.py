@@ -1,0 +1,35 @@
+"""What can be said of a case's liver mask: its volume, and how it agrees with a reference of any origin."""
+
+from pathlib import Path
+from typing import Any
+
+from glisson.core.errors import BadInput
+from glisson.framework.case import ORGAN, Case
+from glisson.framework.importing import read_label_maps
+from glisson.framework.segmentation_scores import SegmentationScores, segmentation_scores
+from glisson.io.images import read_labels
+from glisson.io.label_groups import require_same_grid
+from glisson.preoperative.regions import ORGAN as LIVER
+
+
+def compare_with_reference(case: Case, path: str | Path) -> SegmentationScores:
+    """Scores of the case's liver against a mask: a label map with "liver", or one with a single label.
+
+    Raises:
+        BadInput: the mask cannot be read, has several labels and none is the liver, or lies on another grid.
+    """
+    found = read_labels(case.path(ORGAN))
+    maps = read_label_maps(path)
+    named = next((labels for labels in maps if LIVER in labels.names.values()), None)
+    if named is None and len(maps) == 1 and len(maps[0].names) == 1:
+        named = maps[0]
+    if named is None:
+        raise BadInput(f"The reference {path} has no label {LIVER!r}; give a mask of the liver alone.")
+    require_same_grid(found, named, f"the reference {path}")
+    label = LIVER if LIVER in named.names.values() else next(iter(named.names.values()))
+    return segmentation_scores(found.mask(LIVER), named.mask(label), found.grid)
+
+
+def given_mask_facts(case: Case) -> dict[str, Any]:
+    """The facts of the segment stage where a person gave or corrected the mask: nothing was flagged."""
+    return {"volume_ml": read_labels(case.path(ORGAN)).volume_ml(LIVER), "flagged_slices": [], "flags": []}

@@ -1,0 +1,127 @@
+"""A new case from a scan and label maps of any origin; nothing that identifies the patient comes along.
+
+Only voxels, geometry and the names of known structures are taken over. A label whose name is not known
+is left out, since a name that somebody typed may be a patient's.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from glisson.core.errors import BadInput
+from glisson.core.image import LabelMap, Volume
+from glisson.framework.case import ORGAN, SCAN, STRUCTURES, TUMOURS, Case, new_case, open_case
+from glisson.framework.settings import GIVEN_LABELS, Settings
+from glisson.io.images import read_labels, read_volume, write_labels, write_volume
+from glisson.io.ircad import read_mask_folders
+from glisson.io.label_groups import group_labels, require_same_grid
+from glisson.io.label_names import canonical_name
+from glisson.io.totalsegmentator import class_names
+
+GROUP_FILES = {"organ": ORGAN, "tumours": TUMOURS, "structures": STRUCTURES}
+"""Label group → its file in the case folder."""
+
+_IMAGE_SUFFIXES = (".nii", ".nii.gz", ".nrrd", ".nhdr")
+_KNOWN = {"liver", "portal", "hepatic", "artery", "duct", "wire", "gallbladder", "ivc", "bone", "skin"}
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A new case, the label names it has, and how many labels were left out for their unknown names."""
+
+    case: Case
+    labels: tuple[str, ...]
+    left_out: int
+
+
+def import_case(
+    folder: str | Path,
+    scan: str | Path,
+    labels: Sequence[str | Path] = (),
+    scheme: str | None = None,
+    settings: Settings | None = None,
+) -> Imported:
+    """Make a case folder from a scan and label maps.
+
+    Args:
+        folder: the case folder to make.
+        scan: a DICOM folder, NIfTI or NRRD file.
+        labels: label maps on the scan's grid: files, a folder of such files, a DICOM mask folder, or a
+            folder of DICOM mask folders as of IRCAD.
+        scheme: how label files without names are numbered ("totalsegmentator").
+        settings: those of the case; the segmenter becomes "labels" where the liver is among the labels.
+
+    Raises:
+        BadInput: something cannot be read, lies on another grid, or a label map has no known name.
+        WriteFailed: the disk is full.
+    """
+    volume = read_volume(scan)
+    known, left_out = _known_labels(labels, scheme, volume)
+    groups = group_labels(known)
+    used = settings or Settings()
+    if "organ" in groups:
+        used = used.choosing("segment", GIVEN_LABELS, {})
+    with new_case(folder, used) as making:
+        write_images(making, volume, groups)
+    names = tuple(name for group in groups.values() for name in group.names.values())
+    return Imported(open_case(folder), names, left_out)
+
+
+def write_images(folder: Path, volume: Volume, groups: Mapping[str, LabelMap]) -> None:
+    """Write a scan and label groups ("organ", "tumours", "structures") to their places in a case folder.
+
+    Raises:
+        WriteFailed: the disk is full.
+    """
+    (folder / SCAN).parent.mkdir()
+    write_volume(folder / SCAN, volume)
+    for name, group in groups.items():
+        (folder / GROUP_FILES[name]).parent.mkdir(exist_ok=True)
+        write_labels(folder / GROUP_FILES[name], group)
+
+
+def read_label_maps(path: str | Path, scheme: str | None = None) -> list[LabelMap]:
+    """All label maps at a path: a file, a folder of files, one DICOM mask, or a folder of DICOM masks.
+
+    Raises:
+        BadInput: there is none, or one cannot be read.
+    """
+    source = Path(path)
+    if not source.is_dir():
+        return [read_labels(source, scheme)]
+    entries = sorted(entry for entry in source.iterdir() if not entry.name.startswith("."))
+    files = [entry for entry in entries if entry.name.lower().endswith(_IMAGE_SUFFIXES)]
+    if files:
+        return [read_labels(file, scheme) for file in files]
+    if any(entry.is_dir() for entry in entries):
+        return list(read_mask_folders(source))
+    return [read_labels(source, scheme)]
+
+
+def _known_labels(paths: Sequence[str | Path], scheme: str | None, volume: Volume) -> tuple[list[LabelMap], int]:
+    known: list[LabelMap] = []
+    left_out = 0
+    for path in paths:
+        maps = read_label_maps(path, scheme)
+        kept = [named for labels in maps if (named := _with_known_names(labels)).names]
+        if not kept:
+            raise BadInput(
+                f"{path} has no label of a name that Glisson knows; name them liver, tumour1, portal, hepatic, duct "
+                "and so on, in the file or by the file's name."
+            )
+        for labels in kept:
+            require_same_grid(volume, labels, f"the label map {path}")
+        left_out += sum(len(labels.names) for labels in maps) - sum(len(labels.names) for labels in kept)
+        known += kept
+    return known, left_out
+
+
+def _with_known_names(labels: LabelMap) -> LabelMap:
+    names = {number: name for number, name in labels.names.items() if _is_known(name)}
+    return LabelMap(labels.voxels, labels.grid, names)
+
+
+def _is_known(name: str) -> bool:
+    canonical = {canonical_name(other) for other in class_names().values()}
+    return name in _KNOWN or name in canonical or re.fullmatch(r"tumour\d+", name) is not None
