@@ -34,6 +34,9 @@ def decoding(path: str | Path, kind: str) -> Iterator[None]:
     try:
         yield
     except BadInput as error:
+        # A file in a folder has put its own path there already.
+        if str(error).startswith(str(path)):
+            raise
         raise BadInput(f"{path}: {error}") from error
     except FileNotFoundError as error:
         raise BadInput(f"{error.filename or path} does not exist.") from error
@@ -43,7 +46,7 @@ def decoding(path: str | Path, kind: str) -> Iterator[None]:
         raise BadInput(f"{path} asks for more memory than there is; it is damaged or too large.") from error
     # Parsers of foreign formats throw anything on damaged files; all of it means the same to the user.
     except Exception as error:
-        reason = (str(error).strip() or type(error).__name__).splitlines()[0].rstrip(".")[:200]
+        reason = (" ".join(str(error).split()) or type(error).__name__).rstrip(".")[:200]
         raise BadInput(f"{path} cannot be read as {kind}: it is damaged or of another kind ({reason}).") from error
 
 

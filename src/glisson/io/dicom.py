@@ -3,6 +3,7 @@
 import warnings
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,7 @@ def read_dicom_folder(folder: Path, series_uid: str | None = None) -> StoredImag
     Raises:
         BadInput: no series or several, tags missing, no regular grid, or pixels that cannot be decoded.
     """
-    with decoding(folder, "a DICOM folder"):
+    with decoding(folder, "a DICOM folder"), _quiet():
         files = _one_series(folder, series_uid)
         modality = files[0].modality
         if modality not in ("CT", "MR"):
@@ -46,7 +47,7 @@ def read_dicom_mask(folder: Path) -> StoredImage:
     Raises:
         BadInput: as for `read_dicom_folder`.
     """
-    with decoding(folder, "a DICOM mask"):
+    with decoding(folder, "a DICOM mask"), _quiet():
         slices, grid = _checked_slices(_one_series(folder, None), needs_rescale=False)
         voxels = np.zeros((len(slices), grid.shape[1], grid.shape[0]), dtype=np.uint8)
         for number, frame in _frames(slices):
@@ -58,7 +59,16 @@ def read_dicom_mask(folder: Path) -> StoredImage:
 
 def has_dicom(folder: Path) -> bool:
     """Whether DICOM images lie directly in a folder."""
-    return bool(image_files(folder))
+    with _quiet():
+        return bool(image_files(folder))
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Without pydicom's warnings on values that break the standard's letter: what matters is checked here."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
 
 
 def _one_series(folder: Path, series_uid: str | None) -> list[ImageFile]:
@@ -131,8 +141,7 @@ def _frames(slices: list[Slice]) -> Iterator[tuple[int, NDArray[Any]]]:
     for number, one in enumerate(slices):
         by_path.setdefault(one.path, {})[one.frame] = number
     for path, numbers in by_path.items():
-        with decoding(path, "a DICOM image"), warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with decoding(path, "a DICOM image"):
             expected = slices[next(iter(numbers.values()))].shape[::-1]
             for frame, pixels in enumerate(_decoded(path, expected, len(numbers))):
                 if pixels.shape != expected or frame not in numbers:

@@ -84,13 +84,15 @@ def _refuse_duplicates(ordered: list[Slice], places: FloatArray) -> None:
 
 def _refuse_gaps(places: FloatArray) -> None:
     steps = np.diff(places)
-    gaps = np.flatnonzero(steps > _GAP * np.median(steps))
+    # The lower median: of two different steps the smaller one is the usual one.
+    usual = np.sort(steps)[(len(steps) - 1) // 2]
+    gaps = np.flatnonzero(steps > _GAP * usual)
     if len(gaps):
         low, high = places[gaps[0]], places[gaps[0] + 1]
         more = f", and {len(gaps) - 1} more gaps" if len(gaps) > 1 else ""
         raise BadInput(
             f"a slice is missing between z = {low:.2f} and z = {high:.2f} mm (the usual step is "
-            f"{np.median(steps):.2f} mm){more}; complete the series."
+            f"{usual:.2f} mm){more}; complete the series."
         )
 
 

@@ -5,7 +5,6 @@ images carry geometry at their top level, multi-frame ones in shared and per-fra
 References to other files (DICOMDIR) are never followed.
 """
 
-import warnings
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -47,7 +46,7 @@ _DESCRIBING = [
 _RLE_RATIO = 64
 """PackBits turns two bytes into at most 128."""
 
-_CHUNK = 1 << 16
+_CHUNK = 1 << 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,8 +127,7 @@ def read_header(path: Path) -> Any:
         start = file.read(132)
     if start[128:] != b"DICM" and start[:2] not in (b"\x08\x00", b"\x02\x00", b"\x00\x08"):
         return None
-    with decoding(path, "a DICOM file"), warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    with decoding(path, "a DICOM file"):
         _refuse_inflation(path)
         return pydicom.dcmread(path, stop_before_pixels=True, force=True, specific_tags=_DESCRIBING)
 
@@ -144,8 +142,7 @@ def slices_of(file: ImageFile, needs_rescale: bool) -> list[Slice]:
     Raises:
         BadInput: tags missing (named), values unusable, or a size above the limits.
     """
-    with decoding(file.path, "a DICOM image"), warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    with decoding(file.path, "a DICOM image"):
         _check_size(file)
         groups = _functional_groups(file)
         return [_slice(file, number, group, needs_rescale) for number, group in enumerate(groups)]
@@ -174,9 +171,8 @@ def _refuse_inflation(path: Path) -> None:
 def _unpacks_beyond(file: BinaryIO, limit: int) -> bool:
     decompressor = zlib.decompressobj(-zlib.MAX_WBITS)
     size = 0
-    while chunk := file.read(_CHUNK):
-        # At most 64 MiB at once: deflate's best ratio on one chunk.
-        size += len(decompressor.decompress(chunk))
+    while chunk := decompressor.unconsumed_tail or file.read(_CHUNK):
+        size += len(decompressor.decompress(chunk, _CHUNK))
         if size > limit:
             return True
     return False
@@ -223,7 +219,7 @@ def _slice(file: ImageFile, number: int, groups: Sequence[Any], needs_rescale: b
         found |= {"RescaleSlope": slope, "RescaleIntercept": intercept}
     missing = [keyword for keyword, value in found.items() if value is None]
     if missing:
-        raise BadInput(f"it lacks {' and '.join(_named(keyword) for keyword in missing)}, so it cannot be placed.")
+        raise BadInput(f"it lacks {' and '.join(_named(keyword) for keyword in missing)}, so it cannot be used.")
     axes = _numbers("ImageOrientationPatient", orientation, 6)
     between_rows, between_columns = _numbers("PixelSpacing", spacing, 2)
     if min(between_rows, between_columns) <= 0.0:
@@ -256,7 +252,7 @@ def _find(groups: Sequence[Any], sequence: str, keyword: str) -> Any:
 
 
 def _numbers(keyword: str, value: Any, count: int) -> FloatArray:
-    entries = [value] if count == 1 and not isinstance(value, (list, pydicom.multival.MultiValue)) else list(value)
+    entries = list(value) if isinstance(value, (list, pydicom.multival.MultiValue)) else [value]
     numbers = np.array([float(entry) for entry in entries], dtype=np.float64)
     if numbers.shape != (count,) or not np.isfinite(numbers).all():
         raise BadInput(f"its {keyword} must be {count} finite numbers, not {value}.")

@@ -1,0 +1,339 @@
+import shutil
+import time
+import tracemalloc
+import zlib
+
+import numpy as np
+import pydicom
+import pytest
+from pydicom.encaps import encapsulate, generate_frames
+from pydicom.uid import (
+    DeflatedExplicitVRLittleEndian,
+    JPEG2000Lossless,
+    JPEGLosslessSV1,
+    RLELossless,
+    generate_uid,
+)
+
+from dicom_samples import (
+    change,
+    recompress,
+    slice_dataset,
+    stored_values,
+    write_multiframe,
+    write_series,
+)
+from glisson.core import BadInput
+from glisson.io.images import read_label_maps, read_labels, read_volume
+
+
+def refused(path, complaint, read=read_volume):
+    with pytest.raises(BadInput) as caught:
+        read(path)
+    sentence = str(caught.value)
+    assert complaint in sentence
+    assert "\n" not in sentence
+    return sentence
+
+
+def test_a_folder_without_dicom(tmp_path):
+    (tmp_path / "notes.txt").write_text("nothing here " * 30)
+    (tmp_path / "picture.png").write_bytes(b"\x89PNG\r\n\x1a\n" + b"\0" * 300)
+    refused(tmp_path, "the folder holds no DICOM images.")
+    write_series(tmp_path / "SE0", stored_values(2))
+    write_series(tmp_path / "SE1", stored_values(2))
+    refused(tmp_path, "holds no DICOM images; its folders SE0, SE1 do, so give one of them")
+    (tmp_path / "none").mkdir()
+    refused(tmp_path / "none", "no folder with DICOM masks", read_label_maps)
+    refused(tmp_path / "absent", "does not exist", read_label_maps)
+
+
+def test_an_archive_is_to_be_unpacked_first(tmp_path):
+    for name in ("PATIENT_DICOM.tar.xz", "dicom.zip"):
+        (tmp_path / name).write_bytes(b"x" * 100)
+        refused(tmp_path / name, "is an archive; unpack it first and give the folder")
+
+
+def test_mixed_series_are_listed(tmp_path):
+    one, two = generate_uid(), generate_uid()
+    write_series(tmp_path, stored_values(4), SeriesInstanceUID=one, SeriesDescription="arterial")
+    write_series(tmp_path, stored_values(3), prefix="b", SeriesInstanceUID=two, SeriesDescription="portal")
+    sentence = refused(tmp_path, "mixes 2 series; choose one")
+    assert f"{one} (CT 'arterial', 4 images)" in sentence
+    assert f"{two} (CT 'portal', 3 images)" in sentence
+    with pytest.raises(BadInput, match=r"there is no series 1\.2\.3"):
+        read_volume(tmp_path, "1.2.3")
+
+
+def test_gaps_say_where(tmp_path):
+    paths = write_series(tmp_path, stored_values(8))
+    paths[3].unlink()
+    refused(tmp_path, "a slice is missing between z = -35.00 and z = -30.00 mm (the usual step is 2.50 mm); complete")
+    paths[6].unlink()
+    refused(tmp_path, ", and 1 more gaps")
+
+
+def test_two_slices_at_one_place(tmp_path):
+    paths = write_series(tmp_path, stored_values(5))
+    shutil.copy(paths[2], tmp_path / "copy")
+    sentence = refused(tmp_path, "1 slices lie where another one lies (z = -35.00")
+    assert "copy" in sentence
+    assert paths[2].name in sentence
+
+
+def test_uneven_spacing(tmp_path):
+    paths = write_series(tmp_path, stored_values(6))
+    change(paths[3], ImagePositionPatient=[-30.0, 20.0, -33.0])
+    refused(tmp_path, "unevenly spaced (2.000 to 3.000 mm, worst near z = -33.00)")
+
+
+def test_positions_rounded_to_a_tenth_are_even_enough(tmp_path):
+    paths = write_series(tmp_path, stored_values(6), step=0.625)
+    for number, path in enumerate(paths):
+        change(path, ImagePositionPatient=[-30.0, 20.0, round(-40.0 + 0.625 * number, 1)])
+    assert read_volume(tmp_path).grid.spacing_mm[2] == pytest.approx(0.625, abs=0.02)
+
+
+def test_gantry_tilt_and_shifted_slices(tmp_path):
+    paths = write_series(tmp_path / "tilted", stored_values(6))
+    for number, path in enumerate(paths):
+        place = 2.5 * number
+        change(path, ImagePositionPatient=[-30.0, 20.0 + np.tan(np.radians(12.0)) * place, -40.0 + place])
+    refused(tmp_path / "tilted", "the gantry was tilted by 12.0°, so the scan is sheared; resample it first")
+    paths = write_series(tmp_path / "moved", stored_values(6))
+    change(paths[2], ImagePositionPatient=[-28.0, 20.0, -35.0])
+    refused(tmp_path / "moved", "shifted sideways against each other by up to 2.00 mm")
+
+
+@pytest.mark.parametrize(
+    ("tags", "complaint"),
+    [
+        ({"ImageOrientationPatient": [1, 0, 0, 0, 0, -1]}, "differ in orientation"),
+        ({"ImageOrientationPatient": [1, 0, 0, 1, 0, 0]}, "not perpendicular unit vectors"),
+        ({"ImageOrientationPatient": [0, 0, 0, 0, 0, 0]}, "not perpendicular unit vectors"),
+        ({"PixelSpacing": [0.8, 0.71]}, "differ in pixel spacing: [0.7, 0.8] mm"),
+        ({"PixelSpacing": [0.8, 0.0]}, "PixelSpacing 0.8 × 0.0 mm is not positive"),
+        ({"PixelSpacing": [0.8, -0.7]}, "is not positive"),
+        ({"PixelSpacing": [0.8]}, "its PixelSpacing must be 2 finite numbers"),
+        ({"PixelSpacing": None}, "it lacks PixelSpacing (0028,0030), so it cannot be used"),
+        ({"ImagePositionPatient": None}, "it lacks ImagePositionPatient (0020,0032)"),
+        (
+            {"ImageOrientationPatient": None, "RescaleSlope": None},
+            "it lacks ImageOrientationPatient (0020,0037) and RescaleSlope (0028,1053)",
+        ),
+        ({"RescaleIntercept": None}, "it lacks RescaleIntercept (0028,1052)"),
+        ({"BitsAllocated": None}, "it lacks BitsAllocated (0028,0100)"),
+        ({"RescaleSlope": 0}, "has the rescale slope 0"),
+        ({"SamplesPerPixel": 3}, "it is a colour image, no scan"),
+        ({"BitsAllocated": 64}, "its 64 bits per pixel are not read"),
+        ({"Rows": 41}, "differ in size"),
+        ({"Rows": 65535, "Columns": 65535}, "asks for 65535 × 65535 × 1 voxels (8.6 GB)"),
+        ({"NumberOfFrames": 2**31 - 1}, "asks for"),
+        ({"NumberOfFrames": 3}, "too short for the 36 × 40 × 3 pixels that its header announces"),
+        ({"PixelData": None}, "too short for the 36 × 40 × 1 pixels"),
+    ],
+)
+def test_headers_that_lie(tmp_path, tags, complaint):
+    paths = write_series(tmp_path, stored_values(5))
+    change(paths[2], **tags)
+    sentence = refused(tmp_path, complaint)
+    if "differ" not in complaint:
+        assert paths[2].name in sentence
+
+
+def test_numbers_that_are_none(tmp_path):
+    paths = write_series(tmp_path, stored_values(3))
+    content = paths[1].read_bytes()
+    place = content.index(b"-37.5")
+    paths[1].write_bytes(content[:place] + b"-3x.5" + content[place + 5 :])
+    refused(tmp_path, paths[1].name)
+
+
+def test_one_slice_is_no_volume(tmp_path):
+    write_series(tmp_path, stored_values(1))
+    refused(tmp_path, "needs at least two slices, but there is 1")
+
+
+def test_other_modalities(tmp_path):
+    write_series(tmp_path / "us", stored_values(2), Modality="US")
+    refused(tmp_path / "us", "its modality is US; Glisson reads CT and MR")
+    write_series(tmp_path / "none", stored_values(2), Modality=None)
+    refused(tmp_path / "none", "its modality is missing")
+
+
+def test_tiny_frames_that_ask_for_gigabytes(tmp_path):
+    """64 bytes of run-length code announced as 65535 × 65535 pixels, or as an honest-looking 20000 × 20000."""
+    for name, size, complaint in (
+        ("huge", 65535, "asks for 65535 × 65535 × 1 voxels (8.6 GB)"),
+        ("large", 20000, "too short for the 20000 × 20000 × 1 pixels"),
+    ):
+        for path in write_series(tmp_path / name, stored_values(2)):
+            dataset = pydicom.dcmread(path)
+            dataset.Rows = dataset.Columns = size
+            dataset.file_meta.TransferSyntaxUID = RLELossless
+            dataset.PixelData = encapsulate([b"\x02\0\0\0\x40\0\0\0" + b"\0" * 56])
+            dataset["PixelData"].is_undefined_length = True
+            dataset.save_as(path)
+        tracemalloc.start()
+        refused(tmp_path / name, complaint)
+        assert tracemalloc.get_traced_memory()[1] < 5e6
+        tracemalloc.stop()
+
+
+def test_a_codestream_larger_than_its_header(tmp_path):
+    paths = write_series(tmp_path, stored_values(2))
+    for path in paths:
+        recompress(path, JPEG2000Lossless)
+    dataset = pydicom.dcmread(paths[0])
+    frame = bytearray(next(generate_frames(dataset.PixelData, number_of_frames=1)))
+    place = frame.index(b"\xff\x4f\xff\x51") + 8
+    frame[place : place + 8] = np.array([60000, 60000], ">u4").tobytes()
+    dataset.PixelData = encapsulate([bytes(frame)])
+    dataset["PixelData"].is_undefined_length = True
+    dataset.save_as(paths[0])
+    refused(tmp_path, "its JPEG 2000 image has 60000 × 60000 pixels, its header says 36 × 40")
+
+
+def test_packed_pixels_that_are_absent(tmp_path):
+    paths = write_series(tmp_path, stored_values(2))
+    for path in paths:
+        recompress(path, JPEG2000Lossless)
+    change(paths[0], PixelData=None)
+    refused(tmp_path, "it lacks PixelData (7FE0,0010)")
+
+
+def test_a_deflated_file_that_unpacks_to_gigabytes(tmp_path, monkeypatch):
+    monkeypatch.setattr("glisson.io.dicom_headers.MAX_IMAGE_BYTES", 20_000_000)
+    path = write_series(tmp_path, stored_values(2))[0]
+    recompress(path, DeflatedExplicitVRLittleEndian)
+    dataset = pydicom.dcmread(path)
+    del dataset.PixelData
+    dataset.save_as(path)
+    content = path.read_bytes()
+    start = next(n for n in range(132, len(content)) if _inflates(content[n:]))
+    plain = zlib.decompress(content[start:], -15)
+    bomb = plain + b"\x09\x00\x10\x10OB\0\0" + np.uint32(80_000_000).tobytes() + b"\0" * 80_000_000
+    packer = zlib.compressobj(9, zlib.DEFLATED, -15)
+    path.write_bytes(content[:start] + packer.compress(bomb) + packer.flush())
+    assert path.stat().st_size < 200_000
+    tracemalloc.start()
+    refused(tmp_path, "it unpacks to more than 0.0 GB")
+    assert tracemalloc.get_traced_memory()[1] < 10e6
+    tracemalloc.stop()
+
+
+def _inflates(data):
+    try:
+        return len(zlib.decompress(data, -15)) > 100
+    except zlib.error:
+        return False
+
+
+def test_pixels_cut_short(tmp_path):
+    paths = write_series(tmp_path, stored_values(3))
+    paths[1].write_bytes(paths[1].read_bytes()[:-500])
+    refused(tmp_path, paths[1].name)
+
+
+def test_a_syntax_without_decoder_names_the_package(tmp_path):
+    for path in write_series(tmp_path, stored_values(2)):
+        dataset = pydicom.dcmread(path)
+        dataset.file_meta.TransferSyntaxUID = JPEGLosslessSV1
+        dataset.PixelData = encapsulate([b"\xff\xd8" + b"\0" * 100 + b"\xff\xd9"])
+        dataset["PixelData"].is_undefined_length = True
+        dataset.save_as(path)
+    sentence = refused(tmp_path, "needs a decoder that is not installed")
+    assert "pylibjpeg" in sentence
+    assert "JPEG Lossless" in sentence
+    for path in tmp_path.iterdir():
+        dataset = pydicom.dcmread(path)
+        dataset.file_meta.TransferSyntaxUID = pydicom.uid.MPEG2MPML
+        dataset.save_as(path)
+    refused(tmp_path, "is not supported")
+
+
+def test_frames_and_their_descriptions(tmp_path):
+    pixels = stored_values(4)
+    write_multiframe(tmp_path / "a.dcm", pixels, [0, 1, 2, 3], NumberOfFrames=3)
+    refused(tmp_path, "it announces 3 frames but describes 4")
+    change(tmp_path / "a.dcm", PerFrameFunctionalGroupsSequence=None)
+    refused(tmp_path, "it has 3 frames but lacks PerFrameFunctionalGroupsSequence")
+    write_multiframe(tmp_path / "a.dcm", pixels, [0, 1, 1, 3])
+    refused(tmp_path, "lie where another one lies (z = -37.50: a.dcm frame 2 and a.dcm frame 3)")
+    write_multiframe(tmp_path / "a.dcm", pixels, [0, 1, 3])
+    refused(tmp_path, "a slice is missing between z = -37.50 and z = -32.50")
+
+
+def test_a_dicomdir_is_never_followed(tmp_path):
+    secret = tmp_path / "secret"
+    write_series(secret, stored_values(3))
+    folder = tmp_path / "folder"
+    write_series(folder, stored_values(3))
+    dataset = slice_dataset(stored_values(1)[0], (0, 0, 0), generate_uid(), Rows=None, Columns=None)
+    dataset.file_meta.MediaStorageSOPClassUID = "1.2.840.10008.1.3.10"
+    item = pydicom.Dataset()
+    item.ReferencedFileID = ["..", "secret", "a00_3"]
+    dataset.DirectoryRecordSequence = pydicom.Sequence([item])
+    dataset.save_as(folder / "DICOMDIR")
+    opened = []
+    original = pydicom.dcmread
+
+    def watched(path, *args, **keywords):
+        opened.append(path)
+        return original(path, *args, **keywords)
+
+    pydicom.dcmread = watched
+    try:
+        assert read_volume(folder).grid.shape[2] == 3
+    finally:
+        pydicom.dcmread = original
+    assert opened
+    assert all(path.parent == folder for path in opened)
+
+
+def test_no_pixel_file_is_read_twice_in_vain(tmp_path):
+    """A folder of many files that are no DICOM is passed over quickly."""
+    for number in range(300):
+        (tmp_path / f"{number}.txt").write_bytes(b"x" * 5000)
+    start = time.perf_counter()
+    refused(tmp_path, "no DICOM images")
+    assert time.perf_counter() - start < 2.0
+
+
+def test_masks_of_a_label_scheme(tmp_path):
+    write_series(tmp_path / "liver", np.zeros((3, 40, 36), np.uint8))
+    # An empty mask is a label map without labels.
+    assert not read_labels(tmp_path / "liver").voxels.any()
+    (tmp_path / "liver" / "extra").mkdir()
+    (tmp_path / "broken").mkdir()
+    write_series(tmp_path / "broken", np.zeros((1, 40, 36), np.uint8))
+    refused(tmp_path, "needs at least two slices", read_label_maps)
+
+
+@pytest.mark.parametrize("syntax", [None, JPEG2000Lossless, RLELossless])
+def test_truncations_and_flipped_bits(tmp_path, syntax):
+    """Whatever happens to a file of a series, either an image comes out or one sentence."""
+    paths = write_series(tmp_path, stored_values(3))
+    if syntax:
+        for path in paths:
+            recompress(path, syntax)
+    good = paths[1].read_bytes()
+    rng = np.random.default_rng(5)
+    sentences = []
+    for trial in range(90):
+        content = bytearray(good)
+        if trial % 3 == 0:
+            content = content[: int(rng.integers(len(content)))]
+        else:
+            reach = 1100 if syntax is None else len(content)
+            for place in rng.integers(128, reach, int(rng.integers(1, 5))):
+                content[place] = (
+                    int(rng.integers(256)) if trial % 3 == 1 else content[place] ^ (1 << int(rng.integers(8)))
+                )
+        paths[1].write_bytes(content)
+        try:
+            read_volume(tmp_path)
+        except BadInput as error:
+            sentences.append(str(error))
+    assert len(sentences) > 20
+    assert not any("\n" in sentence for sentence in sentences)
