@@ -100,27 +100,25 @@ def _dorsal_organs() -> list[tuple[Solid, float]]:
 
 
 def _ribs() -> list[tuple[Solid, float]]:
-    """Ribs as tilted rings in the muscle of the wall: dense outside, spongy inside."""
-    rings = [_ring(150.0, 90.0, height) for height in np.arange(-62.0, 200.0, 26.0)]
-    ribs = intersection(union(rings), half_space(1, 84.0, keep_below=True))
-    return [(ribs, 480.0), (grown(ribs, -1.6), 240.0)]
+    """Ribs in the muscle of the wall, dense outside and spongy inside.
 
-
-def _ring(half_width: float, half_depth: float, height: float) -> Solid:
-    """One rib: an elliptic ring that sinks towards the front by 35 degrees, 5 mm thick and 12 mm tall."""
-    sink = np.tan(np.deg2rad(35.0))
+    They are elliptic rings every 26 mm that sink towards the front by 35 degrees, 5 mm thick, 12 mm tall.
+    """
+    half_width, half_depth, apart = 150.0, 90.0, 26.0
+    sink = float(np.tan(np.deg2rad(35.0)))
 
     def distance(points: Points) -> NDArray[Any]:
-        around = _oval(points, half_width, half_depth)
-        level = points[..., 2] - (height + sink * (points[..., 1] - 40.0))
-        # The slope of `level` is 1/cos 35°; a superellipse rounds the section's corners.
-        value: NDArray[Any] = 2.5 * (np.sqrt((around / 2.5) ** 2 + (level * 0.82 / 6.0) ** 2) - 1.0)
+        around = _oval(points, half_width, half_depth) / 2.5
+        level = points[..., 2] - sink * (points[..., 1] - 40.0)
+        # The slope of `level` is 1/cos 35°; the rings repeat along it.
+        height = ((level + apart / 2.0) % apart - apart / 2.0) * (0.82 / 6.0)
+        value: NDArray[Any] = 2.5 * (np.sqrt(around * around + height * height) - 1.0)
         return value
 
-    # Within 95 mm to either side of y = 40 a rib moves by 67 mm up or down.
-    low = [-half_width - 4.0, -half_depth - 4.0, height - sink * (half_depth + 44.0) - 8.0]
-    high = [half_width + 4.0, half_depth + 4.0, height + sink * (half_depth - 36.0) + 8.0]
-    return Solid(distance, np.array([low, high]))
+    low = [-half_width - 4.0, -half_depth - 4.0, -1e3]
+    ribs = Solid(distance, np.array([low, [half_width + 4.0, 84.0, 1e3]]))
+    ribs = intersection(ribs, half_space(1, 84.0, keep_below=True))
+    return [(ribs, 480.0), (grown(ribs, -1.6), 240.0)]
 
 
 def _column(half_width: float, half_depth: float) -> Solid:
@@ -131,9 +129,9 @@ def _column(half_width: float, half_depth: float) -> Solid:
 
 def _oval(points: Points, half_width: float, half_depth: float) -> NDArray[Any]:
     """Signed distance (close to the surface) from an upright elliptic cylinder."""
-    radii = np.array([half_width, half_depth], dtype=points.dtype)
-    scaled = points[..., :2] / radii
-    first = np.sqrt(np.einsum("...i,...i->...", scaled, scaled))
-    second = np.sqrt(np.einsum("...i,...i->...", scaled / radii, scaled / radii))
-    value: NDArray[Any] = first * (first - 1.0) / np.maximum(second, 1e-6)
+    x, y = points[..., 0] / half_width, points[..., 1] / half_depth
+    first = np.sqrt(x * x + y * y)
+    x /= half_width
+    y /= half_depth
+    value: NDArray[Any] = first * (first - 1.0) / np.maximum(np.sqrt(x * x + y * y), 1e-6)
     return value

@@ -95,11 +95,9 @@ class Canvas:
 
 def voxel_places(grid: Grid) -> NDArray[np.float32]:
     """LPS coordinates (i, j, k, 3) of all voxel centres, mm."""
-    affine = grid.lps_from_index
-    i, j, k = (np.arange(n)[:, None] * affine[:3, axis] for axis, n in enumerate(grid.shape))
-    places: NDArray[np.float32] = (i[:, None, None] + j[None, :, None] + k[None, None, :] + affine[:3, 3]).astype(
-        np.float32
-    )
+    affine = grid.lps_from_index.astype(np.float32)
+    i, j, k = (np.arange(n, dtype=np.float32)[:, None] * affine[:3, axis] for axis, n in enumerate(grid.shape))
+    places: NDArray[np.float32] = (i[:, None, None] + j[None, :, None]) + (k + affine[:3, 3])[None, None]
     return places
 
 

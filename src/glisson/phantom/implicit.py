@@ -31,20 +31,20 @@ class Solid:
 def ellipsoid(centre: ArrayLike, radii: ArrayLike, turn: ArrayLike | None = None) -> Solid:
     """Ellipsoid with semi-axes `radii` (3,) along the columns of the rotation `turn` (3, 3).
 
-    The value is |q| (|q| − 1) / |q / r| with q = p / r: zero and of unit slope on the surface.
+    The value is |q| (|q| − 1) / |q / r| with q = p / r: zero and of unit slope on the surface (and zero
+    at the very centre, where it has no direction; no voxel or node lies exactly there).
     """
     middle, semi = np.asarray(centre, dtype=np.float64), np.asarray(radii, dtype=np.float64)
     axes = np.eye(3) if turn is None else np.asarray(turn, dtype=np.float64)
 
     def distance(points: Points) -> NDArray[Any]:
-        local = (points - middle.astype(points.dtype)) @ axes.astype(points.dtype)
+        local = points - middle.astype(points.dtype)
+        if turn is not None:
+            local = local @ axes.astype(points.dtype)
         scaled = local / semi.astype(points.dtype)
-        first = np.sqrt(np.einsum("...i,...i->...", scaled, scaled))
-        scaled /= semi.astype(points.dtype)
-        second = np.sqrt(np.einsum("...i,...i->...", scaled, scaled))
-        value: NDArray[Any] = np.where(
-            second > 1e-9, first * (first - 1.0) / np.maximum(second, 1e-9), -float(semi.min())
-        ).astype(points.dtype)
+        first = length(scaled)
+        second = np.maximum(length(scaled / semi.astype(points.dtype)), 1e-9)
+        value: NDArray[Any] = first * (first - 1.0) / second
         return value
 
     # Half width of a turned ellipsoid along each axis of space.
@@ -63,11 +63,20 @@ def cone(start: ArrayLike, end: ArrayLike, start_radius: float, end_radius: floa
         where = np.clip(offset @ (along / squared).astype(points.dtype), 0.0, 1.0)
         offset -= where[..., None] * along.astype(points.dtype)
         radius = start_radius + where * (end_radius - start_radius)
-        value: NDArray[Any] = np.sqrt(np.einsum("...i,...i->...", offset, offset)) - radius
+        value: NDArray[Any] = length(offset) - radius
         return value
 
     low = np.minimum(a - start_radius, b - end_radius)
     return Solid(distance, np.array([low, np.maximum(a + start_radius, b + end_radius)]))
+
+
+def length(vectors: NDArray[Any]) -> NDArray[Any]:
+    """Euclidean length (...) of vectors (..., k)."""
+    squared = vectors[..., 0] * vectors[..., 0]
+    for axis in range(1, vectors.shape[-1]):
+        squared += vectors[..., axis] * vectors[..., axis]
+    result: NDArray[Any] = np.sqrt(squared)
+    return result
 
 
 def union(solids: list[Solid], blend: float = 0.0) -> Solid:

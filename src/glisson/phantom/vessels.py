@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.stats import qmc
 
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.structures import VesselTree
@@ -74,9 +73,14 @@ class Growth:
 def scattered_targets(
     solid: Solid, depth_mm: float, count: int, random: np.random.Generator, away: Solid | None = None
 ) -> FloatArray:
-    """Evenly scattered points at least `depth_mm` inside the solid (Halton), not inside `away`."""
+    """Evenly scattered points at least `depth_mm` inside the solid, not inside `away`.
+
+    They come from the additive recurrence with the generalised golden ratio (Roberts 2018), shifted at random.
+    """
     low, high = solid.bounds
-    points = low + (high - low) * qmc.Halton(3, rng=random).random(6 * count)
+    ratio = 1.2207440846057596  # the real root of x⁴ = x + 1
+    steps = np.arange(1, 6 * count + 1)[:, None] / ratio ** np.arange(1.0, 4.0)
+    points = low + (high - low) * ((random.uniform(size=3) + steps) % 1.0)
     keep = solid.distance(points) < -depth_mm
     if away is not None:
         keep &= away.distance(points) > 0.0

@@ -1,0 +1,1 @@
+"""CalculiX, the other engine: decks for it and its results back. It need not be installed to import this."""
