@@ -62,7 +62,7 @@ def lever_bar(lever: Lever, angle_deg: float) -> Mesh:
     angle = np.radians(angle_deg)
     arm = np.cos(angle) * lever.arm + np.sin(angle) * lever.up
     top = np.cos(angle) * lever.up - np.sin(angle) * lever.arm
-    return lever.hinge_mm + local @ np.stack([arm, lever.axis, top]), triangles
+    return lever.hinge_mm + local @ np.stack([arm, -lever.axis, top]), triangles
 
 
 def patch(centre: FloatArray, u: FloatArray, v: FloatArray, steps: int = 2) -> Mesh:
