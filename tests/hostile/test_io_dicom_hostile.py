@@ -264,6 +264,7 @@ def test_frames_and_their_descriptions(tmp_path):
     refused(tmp_path, "a slice is missing between z = -37.50 and z = -32.50")
 
 
+@pytest.mark.filterwarnings("ignore:Invalid value for VR")
 def test_a_dicomdir_is_never_followed(tmp_path):
     secret = tmp_path / "secret"
     write_series(secret, stored_values(3))

@@ -79,6 +79,26 @@ def test_several_files_change_together(tmp_path):
     assert names(tmp_path) == ["a.json", "a.vtu"]
 
 
+@pytest.mark.parametrize("fresh", [True, False])
+@pytest.mark.parametrize("failing", [1, 2])
+def test_an_interruption_between_the_renames_of_a_pair(tmp_path, monkeypatch, fresh, failing):
+    one, two = tmp_path / "a.vtu", tmp_path / "a.json"
+    if not fresh:
+        one.write_text("old"), two.write_text("old")
+    replace, calls = os.replace, []
+
+    def fails_once(source, destination):
+        calls.append(source)
+        if len(calls) == failing:
+            raise KeyboardInterrupt
+        replace(source, destination)
+
+    monkeypatch.setattr(os, "replace", fails_once)
+    with pytest.raises(KeyboardInterrupt), atomic_paths(one, two) as (first, second):
+        first.write_text("new"), second.write_text("new")
+    assert [path.read_text() for path in tmp_path.iterdir()] == ([] if fresh else ["old", "old"])
+
+
 def test_flushed_before_renamed(tmp_path, monkeypatch):
     order = []
     flush, replace = os.fsync, os.replace

@@ -4,7 +4,7 @@ import errno
 import os
 import shutil
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -38,6 +38,8 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
 def atomic_paths(*paths: str | Path) -> Iterator[tuple[Path, ...]]:
     """Several files that belong together: none is renamed before all are complete and on the disk.
 
+    An interruption between the renames puts the old files back.
+
     Raises:
         BadInput: nothing can be written there.
         WriteFailed: the disk is full or failing.
@@ -52,8 +54,7 @@ def atomic_paths(*paths: str | Path) -> Iterator[tuple[Path, ...]]:
             yield temporaries
             for temporary in temporaries:
                 _flush(temporary)
-            for target, temporary in zip(targets, temporaries, strict=True):
-                os.replace(temporary, target)
+            _replace_together(targets, temporaries)
             for folder in {target.parent for target in targets}:
                 _flush(folder)
     finally:
@@ -90,6 +91,32 @@ def atomic_folder(path: str | Path) -> Iterator[Path]:
         shutil.rmtree(temporary, ignore_errors=True)
         if target.exists():
             shutil.rmtree(previous, ignore_errors=True)
+
+
+def _replace_together(targets: Sequence[Path], temporaries: Sequence[Path]) -> None:
+    if len(targets) == 1:
+        os.replace(temporaries[0], targets[0])
+        return
+    previous = [_sibling(target) for target in targets]
+    existed = [target.exists() for target in targets]
+    try:
+        for target, kept, exists in zip(targets, previous, existed, strict=True):
+            if exists:
+                shutil.copy2(target, kept)
+        for target, temporary in zip(targets, temporaries, strict=True):
+            os.replace(temporary, target)
+    except BaseException:
+        for target, kept, temporary, exists in zip(targets, previous, temporaries, existed, strict=True):
+            if temporary.exists():
+                continue  # its turn had not come
+            if exists:
+                os.replace(kept, target)
+            else:
+                target.unlink(missing_ok=True)
+        raise
+    finally:
+        for kept in previous:
+            kept.unlink(missing_ok=True)
 
 
 def _swap(target: Path, temporary: Path, previous: Path) -> None:

@@ -18,7 +18,7 @@ from glisson.core import BadInput
 from glisson.io.decoding import check_image_size, decoding
 from glisson.io.dicom_geometry import sorted_slices
 from glisson.io.dicom_headers import ImageFile, Slice, image_files, slices_of, transfer_syntax
-from glisson.io.stored_image import StoredImage, whole_type
+from glisson.io.stored_image import StoredImage, in_c_order, whole_type
 
 _CODESTREAM = b"\xff\x4f\xff\x51"  # JPEG 2000: start of codestream, then the size marker
 
@@ -54,13 +54,13 @@ def read_dicom_mask(folder: Path) -> StoredImage:
             # In MONOCHROME1 the largest value is black.
             black = (1 << slices[number].bits_stored) - 1 if slices[number].is_inverted else 0
             voxels[number] = frame != black
-        return StoredImage(np.ascontiguousarray(voxels.T), grid)
+        return StoredImage(in_c_order(voxels.T), grid)
 
 
 def has_dicom(folder: Path) -> bool:
     """Whether DICOM images lie directly in a folder."""
     with _quiet():
-        return bool(image_files(folder))
+        return next(image_files(folder), None) is not None
 
 
 @contextmanager
@@ -72,7 +72,7 @@ def _quiet() -> Iterator[None]:
 
 
 def _one_series(folder: Path, series_uid: str | None) -> list[ImageFile]:
-    files = image_files(folder)
+    files = list(image_files(folder))
     if not files:
         inner = [entry.name for entry in sorted(folder.iterdir()) if entry.is_dir() and has_dicom(entry)]
         hint = f"; its folders {', '.join(inner[:8])} do, so give one of them" if inner else ""
@@ -112,7 +112,7 @@ def _image(files: list[ImageFile], modality: str) -> StoredImage:
         slope, intercept = _rescale(slices[number])
         # Both fit: the type was chosen for the whole range of the stored bits.
         voxels[number] = frame.astype(kind) * kind.type(slope) + kind.type(intercept)
-    return StoredImage(np.ascontiguousarray(voxels.T), grid, modality=modality)
+    return StoredImage(in_c_order(voxels.T), grid, modality=modality)
 
 
 def _rescale(one: Slice) -> tuple[float, float]:

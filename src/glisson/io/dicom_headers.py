@@ -6,7 +6,7 @@ References to other files (DICOMDIR) are never followed.
 """
 
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -99,20 +99,18 @@ class ImageFile:
         return int(self.header.get("NumberOfFrames", 1) or 1)
 
 
-def image_files(folder: Path) -> list[ImageFile]:
-    """Headers of all images directly in a folder; whatever is no DICOM image is passed over.
+def image_files(folder: Path) -> Iterator[ImageFile]:
+    """Headers of all images directly in a folder, by name; whatever is no DICOM image is passed over.
 
     Raises:
         BadInput: a DICOM file is damaged.
     """
-    found = []
     for path in sorted(folder.iterdir()):
         if path.name.startswith(".") or not path.is_file():
             continue
         header = read_header(path)
         if header is not None and "Rows" in header and "Columns" in header:
-            found.append(ImageFile(path, header))
-    return found
+            yield ImageFile(path, header)
 
 
 def read_header(path: Path) -> Any:

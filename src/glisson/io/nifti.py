@@ -21,7 +21,7 @@ from glisson.core.arrays import FloatArray
 from glisson.io.atomic import atomic_path
 from glisson.io.caret_labels import caret_table, names_from_caret
 from glisson.io.decoding import DEFLATE_RATIO, check_image_size, decoding
-from glisson.io.stored_image import StoredImage, rescaled, whole_type
+from glisson.io.stored_image import StoredImage, in_c_order, rescaled, whole_type
 
 _MM_PER_UNIT = {"unknown": 1.0, "mm": 1.0, "meter": 1000.0, "micron": 0.001}
 _LPS_FROM_RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
@@ -48,7 +48,7 @@ def read_nifti(path: Path) -> StoredImage:
         voxels = rescaled(stored, 1.0 if slope is None else slope, 0.0 if intercept is None else intercept)
         description = bytes(header["descrip"]).rstrip(b"\0").decode("latin-1")
         modality = description.removeprefix(_MODALITY) if description.startswith(_MODALITY) else None
-        return StoredImage(voxels, grid, _names(image.header.extensions), modality)
+        return StoredImage(in_c_order(voxels), grid, _names(image.header.extensions), modality)
 
 
 def write_nifti(

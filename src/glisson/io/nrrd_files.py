@@ -20,7 +20,7 @@ from glisson.core import BadInput, Grid
 from glisson.core.arrays import FloatArray
 from glisson.io.atomic import atomic_path
 from glisson.io.decoding import check_image_size, decoding
-from glisson.io.stored_image import StoredImage
+from glisson.io.stored_image import StoredImage, in_c_order
 
 _LPS_SIGNS = {
     "left-posterior-superior": (1, 1, 1),
@@ -49,7 +49,7 @@ def read_nrrd(path: Path) -> StoredImage:
         grid = _grid(header, sizes)
         voxels = _voxels(path, file, header, dtype).reshape(sizes, order="F")
         names = {int(k): str(v) for k, v in json.loads(header.get("label_names", "{}")).items()}
-        native = np.ascontiguousarray(voxels.astype(dtype.newbyteorder("=")))
+        native = in_c_order(voxels.astype(dtype.newbyteorder("=")))
         return StoredImage(native, grid, names, header.get("modality"))
 
 
