@@ -12,7 +12,6 @@ from pydicom.uid import (
     DeflatedExplicitVRLittleEndian,
     EnhancedCTImageStorage,
     ExplicitVRLittleEndian,
-    ImplicitVRLittleEndian,
     generate_uid,
 )
 
@@ -146,6 +145,3 @@ def _item(**tags: Any) -> Sequence:
     for keyword, value in tags.items():
         setattr(item, keyword, value)
     return Sequence([item])
-
-
-IMPLICIT = ImplicitVRLittleEndian

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from glisson.core import BadInput, Grid, LabelMap, Volume
-from glisson.io.images import read_labels, write_labels, write_volume
+from glisson.io.images import read_label_maps, read_labels, write_labels, write_volume
 from glisson.io.label_groups import group_labels, on_grid_of, require_same_grid
 from glisson.io.label_names import canonical_name, canonical_names
 from glisson.io.totalsegmentator import class_names
@@ -157,3 +157,12 @@ def test_written_groups_read_back(tmp_path):
     for name, labels in groups.items():
         write_labels(tmp_path / f"{name}.nii.gz", labels)
         assert dict(read_labels(tmp_path / f"{name}.nii.gz").names) == dict(labels.names)
+
+
+def test_a_folder_of_mask_files_is_one_map_each(tmp_path):
+    for name in ("liver", "inferior_vena_cava", "kidney_left"):
+        numbered(tmp_path / f"{name}.nii.gz", [1])
+    (tmp_path / ".hidden").write_text("")
+    (tmp_path / "readme.txt").write_text("")
+    maps = read_label_maps(tmp_path)
+    assert [dict(labels.names) for labels in maps] == [{1: "ivc"}, {1: "kidney_left"}, {1: "liver"}]

@@ -55,8 +55,7 @@ def atomic_paths(*paths: str | Path) -> Iterator[tuple[Path, ...]]:
             for temporary in temporaries:
                 _flush(temporary)
             _replace_together(targets, temporaries)
-            for folder in {target.parent for target in targets}:
-                _flush(folder)
+            _flush_folders({target.parent for target in targets})
     finally:
         for temporary in temporaries:
             with suppress(OSError):
@@ -83,10 +82,11 @@ def atomic_folder(path: str | Path) -> Iterator[Path]:
             except OSError as error:
                 raise _refusal(target, error) from error
             yield temporary
-            for entry in sorted(temporary.rglob("*")):
-                _flush(entry)
+            for entry in temporary.rglob("*"):
+                if entry.is_file():
+                    _flush(entry)
             _swap(target, temporary, previous)
-            _flush(target.parent)
+            _flush_folders({target.parent})
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
         if target.exists():
@@ -154,6 +154,13 @@ def _flush(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+def _flush_folders(folders: set[Path]) -> None:
+    # The files are in place; some network file systems only cannot flush a folder.
+    for folder in folders:
+        with suppress(OSError):
+            _flush(folder)
 
 
 @contextmanager

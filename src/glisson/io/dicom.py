@@ -26,6 +26,8 @@ _CODESTREAM = b"\xff\x4f\xff\x51"  # JPEG 2000: start of codestream, then the si
 def read_dicom_folder(folder: Path, series_uid: str | None = None) -> StoredImage:
     """Read a CT or MR series, single-frame or multi-frame, compressed or not; rescaled to HU for CT.
 
+    MONOCHROME1 says how values are shown, not what they are: it changes nothing here (but see masks).
+
     Args:
         folder: its images lie directly in it; other files are passed over.
         series_uid: which series, where there are several.

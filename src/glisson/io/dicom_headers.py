@@ -15,7 +15,6 @@ import numpy as np
 import pydicom
 from pydicom.datadict import tag_for_keyword
 from pydicom.dataset import Dataset
-from pydicom.filereader import read_preamble
 from pydicom.uid import DeflatedExplicitVRLittleEndian, RLELossless
 
 from glisson.core import BadInput
@@ -47,6 +46,7 @@ _RLE_RATIO = 64
 """PackBits turns two bytes into at most 128."""
 
 _CHUNK = 1 << 20
+_LARGEST_META = 1 << 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,10 +160,24 @@ def transfer_syntax(header: Any) -> str:
 def _refuse_inflation(path: Path) -> None:
     """Deflated files are unpacked whole by pydicom, so they are measured first."""
     with path.open("rb") as file:
-        read_preamble(file, True)
-        meta = pydicom.filereader._read_file_meta_info(file)  # leaves the file where the data set starts
-        if meta.get("TransferSyntaxUID") == DeflatedExplicitVRLittleEndian and _unpacks_beyond(file, MAX_IMAGE_BYTES):
+        start = 132 if file.read(132)[128:] == b"DICM" else 0
+        file.seek(start)
+        meta = file.read(_LARGEST_META)
+        if DeflatedExplicitVRLittleEndian.encode() not in meta:
+            return
+        file.seek(start + _end_of_meta(meta))
+        if _unpacks_beyond(file, MAX_IMAGE_BYTES):
             raise BadInput(f"it unpacks to more than {MAX_IMAGE_BYTES / 1e9:.1f} GB.")
+
+
+def _end_of_meta(block: bytes) -> int:
+    """Where the elements of group 0002 end; they are explicit little endian, whatever follows them."""
+    position = 0
+    while block[position : position + 2] == b"\x02\0":
+        is_long = block[position + 4 : position + 6] in (b"OB", b"UN")
+        field = slice(position + 8, position + 12) if is_long else slice(position + 6, position + 8)
+        position += (12 if is_long else 8) + int.from_bytes(block[field], "little")
+    return position
 
 
 def _unpacks_beyond(file: BinaryIO, limit: int) -> bool:

@@ -17,6 +17,7 @@ from glisson.io.stored_image import StoredImage, as_whole_numbers
 from glisson.io.totalsegmentator import class_names
 
 _ARCHIVES = (".zip", ".tar", ".tgz", ".txz", ".tar.gz", ".tar.xz", ".tar.bz2", ".7z", ".rar")
+_IMAGES = (".nii", ".nii.gz", ".nrrd", ".nhdr")
 SCHEMES = ("totalsegmentator", "ircad")
 """How other tools number or name their labels."""
 
@@ -77,7 +78,7 @@ def read_labels(path: str | Path, scheme: str | None = None, names: Mapping[int,
 def read_label_maps(
     path: str | Path, scheme: str | None = None, names: Mapping[int, str] | None = None
 ) -> tuple[LabelMap, ...]:
-    """Read whatever holds labels: one file, one mask folder, or a folder of mask folders (one map each).
+    """Read whatever holds labels: one file, one mask folder, or a folder of such files or folders (one map each).
 
     Arguments as for `read_labels`.
 
@@ -86,7 +87,9 @@ def read_label_maps(
     """
     source = Path(path)
     if source.is_dir() and not has_dicom(source):
-        return read_mask_folders(source)
+        visible = [file for file in sorted(source.iterdir()) if not file.name.startswith(".")]
+        files = [file for file in visible if file.name.lower().endswith(_IMAGES)]
+        return tuple(read_labels(file, scheme, names) for file in files) or read_mask_folders(source)
     return (read_labels(source, scheme, names),)
 
 
@@ -105,9 +108,9 @@ def _stored(path: Path) -> StoredImage:
     name = path.name.lower()
     if not path.exists():
         raise BadInput(f"{path} does not exist.")
-    if name.endswith((".nii", ".nii.gz")):
+    if name.endswith(_IMAGES[:2]):
         return read_nifti(path)
-    if name.endswith((".nrrd", ".nhdr")):
+    if name.endswith(_IMAGES[2:]):
         return read_nrrd(path)
     if name.endswith(_ARCHIVES):
         raise BadInput(f"{path} is an archive; unpack it first and give the folder.")

@@ -13,7 +13,6 @@ from typing import Any, BinaryIO
 
 import nrrd
 import numpy as np
-from nrrd.reader import _TYPEMAP_NRRD2NUMPY as DTYPES  # the only table of the format's type names
 from numpy.typing import NDArray
 
 from glisson.core import BadInput, Grid
@@ -22,6 +21,18 @@ from glisson.io.atomic import atomic_path
 from glisson.io.decoding import check_image_size, decoding
 from glisson.io.stored_image import StoredImage, in_c_order
 
+_NAMES_OF_TYPE = {
+    "i1": ("signed char", "int8", "int8_t"),
+    "u1": ("uchar", "unsigned char", "uint8", "uint8_t"),
+    "i2": ("short", "short int", "signed short", "signed short int", "int16", "int16_t"),
+    "u2": ("ushort", "unsigned short", "unsigned short int", "uint16", "uint16_t"),
+    "i4": ("int", "signed int", "int32", "int32_t"),
+    "u4": ("uint", "unsigned int", "uint32", "uint32_t"),
+    "i8": ("longlong", "long long", "long long int", "signed long long", "signed long long int", "int64", "int64_t"),
+    "u8": ("ulonglong", "unsigned long long", "unsigned long long int", "uint64", "uint64_t"),
+    "f4": ("float",),
+    "f8": ("double",),
+}
 _LPS_SIGNS = {
     "left-posterior-superior": (1, 1, 1),
     "LPS": (1, 1, 1),
@@ -82,13 +93,13 @@ def write_nrrd(
 
 
 def _dtype(header: Mapping[str, Any]) -> np.dtype[Any]:
-    name = DTYPES.get(header["type"])
-    if name is None or name == "V":
+    code = next((code for code, names in _NAMES_OF_TYPE.items() if header["type"] in names), None)
+    if code is None:
         raise BadInput(f"its voxels are of type {header['type']!r}, not plain numbers.")
     order = {"little": "<", "big": ">"}.get(header.get("endian", "little"))
     if order is None:
         raise BadInput(f"its byte order {header['endian']!r} is unknown.")
-    dtype: np.dtype[Any] = np.dtype(order + str(name))
+    dtype: np.dtype[Any] = np.dtype(order + code)
     return dtype
 
 
