@@ -13,3 +13,16 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"real data not found at {folder} (set GLISSON_SHARED_DATA)")
     return folder
+
+
+@pytest.fixture(scope="session")
+def meshed_small_case(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The small case of `small_case.py` with its model and scenario; copy it before changing it."""
+    from glisson.framework.stages import PIPELINE
+    from small_case import make_small_case, offer_bending
+
+    with pytest.MonkeyPatch.context() as patch:
+        offer_bending(patch)
+        case = make_small_case(tmp_path_factory.mktemp("meshed") / "case")
+        PIPELINE.run(case, "scenario")
+    return case.folder

@@ -17,6 +17,14 @@ class Answer:
     text: str = ""
     exit_code: int = 0
 
+    def line(self) -> str:
+        """The values as one line of JSON.
+
+        Raises:
+            ValueError: a number is not finite.
+        """
+        return json.dumps(self.values, allow_nan=False, ensure_ascii=False) + "\n"
+
 
 @contextmanager
 def private_stdout() -> Iterator[TextIO]:
@@ -35,17 +43,29 @@ def private_stdout() -> Iterator[TextIO]:
     with os.fdopen(kept, "w", encoding="utf-8", errors="backslashreplace") as answers:
         try:
             sys.stdout = sys.stderr
-            yield answers
-            answers.flush()
+            with _whether_read_or_not(answers):
+                yield answers
         finally:
             sys.stdout = previous
             with suppress(OSError):
                 os.dup2(answers.fileno(), 1)
 
 
+@contextmanager
+def _whether_read_or_not(stream: TextIO) -> Iterator[None]:
+    """Nobody may be reading any more (`glisson techniques | head -1`): that is no trouble of ours."""
+    try:
+        yield
+        stream.flush()
+    except BrokenPipeError:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)
+
+
 def tell(answer: Answer, as_json: bool, stdout: TextIO) -> None:
     """Print an answer: with `as_json` one object on `stdout` and the text on stderr, else the text on `stdout`."""
     if as_json:
-        stdout.write(json.dumps(answer.values, allow_nan=False, ensure_ascii=False) + "\n")
+        stdout.write(answer.line())
     if answer.text:
         (sys.stderr if as_json else stdout).write(answer.text.rstrip("\n") + "\n")

@@ -8,6 +8,7 @@ import os
 import re
 import sys
 import traceback
+import warnings
 from collections.abc import Sequence
 from contextlib import redirect_stdout
 from importlib import import_module
@@ -53,18 +54,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _answer(words: Sequence[str], stdout: TextIO) -> Answer:
     """The answer of a command, whatever happens in it."""
+    debug = "--debug" in words or bool(os.environ.get("GLISSON_DEBUG"))
     command = _command(next((word for word in words if not word.startswith("-")), ""))
     lines = StageLines()
     try:
+        if not debug:
+            warnings.simplefilter("ignore")  # they speak to programmers, of lines of code
         with redirect_stdout(stdout):
             arguments = _parser(command).parse_args(words)
         assert command is not None  # the parser asks for one
-        return command.run(arguments, lines)
+        answer = command.run(arguments, lines)
+        answer.line()  # a number that cannot be printed is a failure like any other
+        return answer
     except SystemExit:  # after --help and --version
         return Answer({})
     except BaseException as error:
         lines.close()
-        if "--debug" in words or os.environ.get("GLISSON_DEBUG"):
+        if debug:
             traceback.print_exc()
         return _failure(error, lines.stage, command)
 

@@ -5,9 +5,8 @@ from typing import Any
 
 from glisson.core.errors import BadInput
 from glisson.framework.case import ORGAN, Case
-from glisson.framework.importing import read_label_maps
 from glisson.framework.segmentation_scores import SegmentationScores, segmentation_scores
-from glisson.io.images import read_labels
+from glisson.io.images import read_label_maps, read_labels
 from glisson.io.label_groups import require_same_grid
 from glisson.preoperative.regions import ORGAN as LIVER
 

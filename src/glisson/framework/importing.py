@@ -13,8 +13,7 @@ from glisson.core.errors import BadInput
 from glisson.core.image import LabelMap, Volume
 from glisson.framework.case import ORGAN, SCAN, STRUCTURES, TUMOURS, Case, new_case, open_case
 from glisson.framework.settings import GIVEN_LABELS, Settings
-from glisson.io.images import read_labels, read_volume, write_labels, write_volume
-from glisson.io.ircad import read_mask_folders
+from glisson.io.images import read_label_maps, read_volume, write_labels, write_volume
 from glisson.io.label_groups import group_labels, require_same_grid
 from glisson.io.label_names import canonical_name
 from glisson.io.totalsegmentator import class_names
@@ -22,7 +21,6 @@ from glisson.io.totalsegmentator import class_names
 GROUP_FILES = {"organ": ORGAN, "tumours": TUMOURS, "structures": STRUCTURES}
 """Label group → its file in the case folder."""
 
-_IMAGE_SUFFIXES = (".nii", ".nii.gz", ".nrrd", ".nhdr")
 _KNOWN = {"liver", "portal", "hepatic", "artery", "duct", "wire", "gallbladder", "ivc", "bone", "skin"}
 
 
@@ -79,24 +77,6 @@ def write_images(folder: Path, volume: Volume, groups: Mapping[str, LabelMap]) -
     for name, group in groups.items():
         (folder / GROUP_FILES[name]).parent.mkdir(exist_ok=True)
         write_labels(folder / GROUP_FILES[name], group)
-
-
-def read_label_maps(path: str | Path, scheme: str | None = None) -> list[LabelMap]:
-    """All label maps at a path: a file, a folder of files, one DICOM mask, or a folder of DICOM masks.
-
-    Raises:
-        BadInput: there is none, or one cannot be read.
-    """
-    source = Path(path)
-    if not source.is_dir():
-        return [read_labels(source, scheme)]
-    entries = sorted(entry for entry in source.iterdir() if not entry.name.startswith("."))
-    files = [entry for entry in entries if entry.name.lower().endswith(_IMAGE_SUFFIXES)]
-    if files:
-        return [read_labels(file, scheme) for file in files]
-    if any(entry.is_dir() for entry in entries):
-        return list(read_mask_folders(source))
-    return [read_labels(source, scheme)]
 
 
 def _known_labels(paths: Sequence[str | Path], scheme: str | None, volume: Volume) -> tuple[list[LabelMap], int]:

@@ -154,7 +154,8 @@ def _current(
     if found.state is State.CURRENT or kept:
         heard.skipped(stage.name, found.reason)
         return 0.0, found.record
-    progress = heard.begun(stage.name, found.reason)
+    given = found.state is State.GIVEN and not replace
+    progress = heard.begun(stage.name, "what was given must be checked" if given else found.reason)
     work = case.path(_WORK)
     started = time.perf_counter()
     for name in (*stage.outputs, stage.record_name):
@@ -169,8 +170,8 @@ def _current(
     if settings != case.settings():
         moves.append(_staged_settings(case, settings))
     if found.state is State.GIVEN:
-        given = [case.path(name) for name in stage.outputs if case.has(name)]
-        lost = [place for place in given if content_hash(place) not in outputs.values()]
+        there = [case.path(name) for name in stage.outputs if case.has(name)]
+        lost = [place for place in there if content_hash(place) not in outputs.values()]
         moves = [(place, place.with_name(f"previous-{place.name}")) for place in lost] + moves
     _put_in_place(moves, work)
     shutil.rmtree(work, ignore_errors=True)
