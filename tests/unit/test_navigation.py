@@ -26,6 +26,7 @@ from glisson.navigation.guidance import navigate
 from glisson.navigation.plan import Plan
 from glisson.navigation.results import as_results
 from glisson.navigation.volumes import label_parts, organ_volume_mm3, removed_volume_mm3
+from glisson.navigation.wire import Wire
 
 SIZE = (100.0, 40.0, 20.0)
 CENTRE, RADIUS = np.array([70.0, 20.0, 10.0]), 6.0
@@ -225,6 +226,15 @@ def test_extensions_are_straight():
     assert told.carried is None
     assert told.volume.removed_after == pytest.approx(1.0)
     assert any("does not meet the liver" in note for note in told.notes)
+
+
+def test_a_curved_wire_is_not_short_cut_by_its_extension():
+    """A wire that goes up, across and down beside its own beginning: the tumour lies at its end, not at its mouth."""
+    turns = Curve([[30.0, 20.0, 2.0], [30.0, 20.0, 18.0], [80.0, 20.0, 18.0], [80.0, 20.0, 10.0], [60.0, 20.0, 10.0]])
+    wire = Wire(turns.points_mm, turns.length_mm)
+    arcs, distance = wire.project(np.array([[30.0, 20.0, -5.0], [55.0, 21.0, 10.0], [45.0, 20.0, 19.0]]))
+    np.testing.assert_allclose(arcs, [-7.0, turns.length_mm + 5.0, 31.0], atol=1e-9)
+    np.testing.assert_allclose(distance, [0.0, 1.0, 1.0], atol=1e-9)
 
 
 def test_a_failed_solve_keeps_its_status():

@@ -42,8 +42,9 @@ def rule_plane(wire: Wire, surface: TriangleSurface, distance_mm: float) -> Rule
     wire, that is, given the arc length of the wire's nearest point, arc length 0 being the duct's mouth.
     The least of these is the tumour's most hilar extent. From there the plane stands `distance_mm` of
     arc length further towards the mouth, perpendicular to the wire's tangent there. Its normal points
-    inward, towards the tumour's side, which is removed. Where the tumour reaches beyond an end of the
-    wire, the wire is extended straight by its end tangent, and a note says so.
+    inward, towards the tumour's side, which is removed. Vertices whose nearest point is an end of the wire
+    are projected onto its straight extension by the end tangent; where the plane rests on an extension,
+    a note says so.
     """
     arcs, distances = wire.project(surface.vertices)
     nearest = float(arcs.min())

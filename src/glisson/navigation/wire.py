@@ -41,7 +41,7 @@ class Wire:
     @property
     def points_mm(self) -> FloatArray:
         """The wire from mouth to tip as a polyline (n, 3)."""
-        inner = (self._arcs > 0.0) & (self._arcs < self.length_mm)
+        inner = (self._arcs > 1e-9) & (self._arcs < self.length_mm - 1e-9)
         return np.vstack([self.at(0.0), self._rows[inner], self.at(self.length_mm)])
 
     def at(self, arc_mm: ArrayLike) -> FloatArray:
@@ -55,16 +55,28 @@ class Wire:
         return direction
 
     def project(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Arc length (n,) of the extended wire's point nearest to each of (n, 3), and the distance (n,)."""
+        """Arc length (n,) of the wire's point nearest to each of (n, 3), and the distance (n,).
+
+        Only where that nearest point is an end of the wire does its straight extension count, so a wire
+        that curves is not short-cut by an extension that passes by.
+        """
+        nodes = self.points_mm
+        marks = Curve(nodes).arc_lengths_mm
         arcs, least = np.zeros(len(points_mm)), np.full(len(points_mm), np.inf)
-        for segment, (start, step) in enumerate(zip(self._rows[:-1], np.diff(self._rows, axis=0), strict=True)):
+        for segment, (start, step) in enumerate(zip(nodes[:-1], np.diff(nodes, axis=0), strict=True)):
             offset = points_mm - start
             share = np.clip(offset @ step / (step @ step), 0.0, 1.0)
             distance = np.linalg.norm(offset - share[:, None] * step, axis=1)
             nearer = distance < least
-            length = self._arcs[segment + 1] - self._arcs[segment]
-            arcs[nearer] = self._arcs[segment] + share[nearer] * length
+            arcs[nearer] = marks[segment] + share[nearer] * (marks[segment + 1] - marks[segment])
             least = np.minimum(least, distance)
+        before, behind = arcs <= 0.0, arcs >= marks[-1]
+        first, last = self._rows[1] - self._rows[0], self._rows[-1] - self._rows[-2]
+        arcs[before] = np.minimum((points_mm[before] - nodes[0]) @ first / np.linalg.norm(first), 0.0)
+        beyond = np.maximum((points_mm[behind] - nodes[-1]) @ last / np.linalg.norm(last), 0.0)
+        arcs[behind] = self.length_mm + beyond
+        ends = before | behind
+        least[ends] = np.linalg.norm(points_mm[ends] - self.at(arcs[ends]), axis=1)
         return arcs, least
 
 

@@ -36,7 +36,18 @@ _OTHERS = (PURPLE, YELLOW, SKY, ORANGE)
 
 def structure_colour(name: str) -> Rgb:
     """Colour of a vessel tree or another structure by its name; the same name always has the same colour."""
-    return _STRUCTURES.get(name, _OTHERS[sum(name.encode()) % len(_OTHERS)])
+    kind = kind_of(name)
+    return _STRUCTURES.get(kind, _OTHERS[sum(kind.encode()) % len(_OTHERS)])
+
+
+def is_outlined(name: str) -> bool:
+    """Whether a structure is outlined on slices: what lies in or at the liver, not skin or bones around it."""
+    return kind_of(name) in _STRUCTURES
+
+
+def kind_of(name: str) -> str:
+    """The name without a number that tells pieces of one kind apart: "artery 3" is an "artery"."""
+    return name.rstrip("0123456789").rstrip(" -_") or name
 
 
 def displacement_colours(largest_mm: float) -> Palette:

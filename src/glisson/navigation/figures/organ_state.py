@@ -13,7 +13,7 @@ from glisson.core.structures import Plane
 from glisson.geometry.mapping import PointMap
 from glisson.geometry.planes import plane_basis
 from glisson.geometry.quadratic import boundary_surface
-from glisson.navigation.figures.colours import LEVER, LIVER, TUMOUR, WIRE, Rgb, structure_colour
+from glisson.navigation.figures.colours import LEVER, LIVER, TUMOUR, WIRE, Rgb, kind_of, structure_colour
 from glisson.navigation.rendering.bodies import Body, Palette
 from glisson.navigation.rendering.shapes import lever_bar, patch, tree_tubes, tube
 from glisson.navigation.wire import Wire, carried_wire
@@ -127,7 +127,7 @@ def legend(model: Model, scenario: Scenario) -> dict[str, Rgb]:
     if model.structures.duct is not None:
         entries["wire"] = WIRE
     for tree in model.structures.trees:
-        entries[tree.name] = structure_colour(tree.name)
+        entries[kind_of(tree.name)] = structure_colour(tree.name)
     if any(isinstance(tool, Lever) for tool in scenario.tools):
         entries["lever"] = LEVER
     return entries

@@ -12,7 +12,7 @@ from scipy.ndimage import map_coordinates
 from glisson.core.arrays import FloatArray
 from glisson.core.image import Grid, LabelMap, Volume
 from glisson.core.structures import Plane
-from glisson.navigation.figures.colours import LIVER, PLANE, TUMOUR, VERMILLION, Rgb, structure_colour
+from glisson.navigation.figures.colours import LIVER, PLANE, TUMOUR, VERMILLION, Rgb, is_outlined, structure_colour
 from glisson.navigation.figures.picture import Picture, new_figure, picture
 
 _PIXEL_MM = 0.8
@@ -101,7 +101,7 @@ def _outlines(
         if labels is None:
             continue
         for number, name in labels.names.items():
-            if np.any(labels.voxels == number):
+            if (colours is not None or is_outlined(name)) and np.any(labels.voxels == number):
                 found.append((name, labels, number, structure_colour(name) if colours is None else colours))
     return found
 
