@@ -18,7 +18,7 @@ from glisson.navigation.rendering.bodies import Body, Palette
 from glisson.navigation.rendering.shapes import lever_bar, patch, tree_tubes, tube
 from glisson.navigation.wire import Wire, carried_wire
 
-_WIRE_RADIUS_MM = 1.0
+_WIRE_RADIUS_MM = 1.4
 _SQUARE_MM = 25.4
 """The board's squares: one inch, as on the dissertation's checkerboard."""
 
