@@ -228,6 +228,23 @@ def test_extensions_are_straight():
     assert any("does not meet the liver" in note for note in told.notes)
 
 
+def test_repeated_points_of_the_duct_change_nothing():
+    twice = model(duct=Curve([[0, 20, 10], [0, 20, 10], [30, 20, 10], [30, 20, 10], [90, 20, 10], [90, 20, 10]]))
+    told = navigate(twice, deformed(twice, lambda p: p), Plan())
+    for plane in (told.rule, told.carried):
+        np.testing.assert_allclose(plane.before.point_mm, [59.0, 20.0, 10.0], atol=1e-9)
+        assert abs(plane.after.distance_mm([[59.0, 0.0, 0.0]])[0]) < 1e-9
+
+
+@pytest.mark.parametrize("length", np.linspace(22.0, 22.1, 21))
+def test_the_rule_gives_the_same_plane_where_nothing_moves_along_the_wire(length):
+    """Wires that end within rounding of a point of the duct are no exception."""
+    duct = Curve([[0, 20, 10], [length, 20, 10], [length + 1e-13, 20, 10]])
+    body = model(duct=duct, wire_length_mm=length)
+    told = navigate(body, deformed(body, lambda p: p + 1e-13 * p[:, :1] * [1.0, 0.0, 0.0]), Plan())
+    assert told.rule.after.point_mm == pytest.approx([59.0, 20.0, 10.0], abs=1e-9)
+
+
 def test_a_curved_wire_is_not_short_cut_by_its_extension():
     """A wire that goes up, across and down beside its own beginning: the tumour lies at its end, not at its mouth."""
     turns = Curve([[30.0, 20.0, 2.0], [30.0, 20.0, 18.0], [80.0, 20.0, 18.0], [80.0, 20.0, 10.0], [60.0, 20.0, 10.0]])
@@ -303,6 +320,8 @@ def test_bad_plans_are_refused_with_a_sentence():
         Plan(distance_mm=-1.0)
     with pytest.raises(BadInput, match="does not cut the liver"):
         navigate(body, still, Plan(plane_points_mm=[[-40, 0, 0], [-40, 1, 0], [-40, 0, 1]]))
+    with pytest.raises(BadInput, match="wire's length must be positive"):
+        navigate(model(wire_length_mm=0.0), still, Plan())
     leaky = sphere(CENTRE, RADIUS)
     leaky = model(tumours=(Tumour("open", TriangleSurface(leaky.vertices, leaky.triangles[1:])),))
     with pytest.raises(BadInput, match="not closed"):

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from glisson.core.arrays import FloatArray
+from glisson.core.errors import BadInput
 from glisson.core.structures import Curve
 from glisson.geometry.mapping import PointMap
 
@@ -12,6 +13,9 @@ CHORD_MM = 3.0
 the chord of a circle is parallel to the tangent at its middle."""
 
 _EXTENSION_MM = 1000.0
+_REPEAT_MM = 1e-6
+"""Points of a curve that are no farther apart than this are one point."""
+
 _STEP_MM = 1.0
 
 
@@ -22,26 +26,28 @@ class Wire:
     """
 
     def __init__(self, points_mm: FloatArray, length_mm: float) -> None:
-        """The first `length_mm` of the polyline (n, 3); extended by its end tangent where it is shorter."""
-        whole = Curve(points_mm)
+        """The first `length_mm` of the polyline (n, 3); extended by its end tangent where it is shorter.
+
+        Raises:
+            BadInput: the length is not positive.
+        """
+        if not length_mm > _REPEAT_MM:
+            raise BadInput(f"The wire's length must be positive, not {length_mm} mm.")
+        whole = _without_repeats(points_mm)
         self.length_mm = float(length_mm)
-        start, end = _end_tangents(whole)
-        arcs = np.concatenate([[-_EXTENSION_MM], whole.arc_lengths_mm, [whole.length_mm + _EXTENSION_MM]])
-        first, last = whole.points_mm[0], whole.points_mm[-1]
-        rows = np.vstack([first - _EXTENSION_MM * start, whole.points_mm, last + _EXTENSION_MM * end])
         if length_mm < whole.length_mm:
-            inner = arcs < length_mm
-            tip = _at(arcs, rows, np.array([length_mm]))
-            cut = Curve(np.vstack([rows[1:][inner[1:]], tip]))
-            end = _end_tangents(cut)[1]
-            arcs = np.concatenate([arcs[inner], [length_mm, length_mm + _EXTENSION_MM]])
-            rows = np.vstack([rows[inner], tip, tip + _EXTENSION_MM * end])
-        self._arcs, self._rows = arcs, rows
+            inner = whole.arc_lengths_mm < length_mm - _REPEAT_MM
+            tip = _at(whole.arc_lengths_mm, whole.points_mm, np.array([length_mm]))
+            whole = Curve(np.vstack([whole.points_mm[inner], tip]))
+        start, end = _end_tangents(whole)
+        first, last = whole.points_mm[0], whole.points_mm[-1]
+        self._arcs = np.concatenate([[-_EXTENSION_MM], whole.arc_lengths_mm, [whole.length_mm + _EXTENSION_MM]])
+        self._rows = np.vstack([first - _EXTENSION_MM * start, whole.points_mm, last + _EXTENSION_MM * end])
 
     @property
     def points_mm(self) -> FloatArray:
         """The wire from mouth to tip as a polyline (n, 3)."""
-        inner = (self._arcs > 1e-9) & (self._arcs < self.length_mm - 1e-9)
+        inner = (self._arcs > _REPEAT_MM) & (self._arcs < self.length_mm - _REPEAT_MM)
         return np.vstack([self.at(0.0), self._rows[inner], self.at(self.length_mm)])
 
     def at(self, arc_mm: ArrayLike) -> FloatArray:
@@ -93,6 +99,12 @@ def carried_wire(duct: Curve, length_mm: float, point_map: PointMap) -> tuple[Wi
     carried = Curve(point_map.forward(in_a.at(arcs)))
     slide = length_mm - float(carried.arc_lengths_mm[np.searchsorted(arcs, length_mm)])
     return Wire(carried.points_mm, length_mm), slide
+
+
+def _without_repeats(points_mm: FloatArray) -> Curve:
+    """The polyline without points that repeat their predecessor, whose segments would have no direction."""
+    steps = np.linalg.norm(np.diff(points_mm, axis=0), axis=1)
+    return Curve(points_mm[np.concatenate([[True], steps > _REPEAT_MM])])
 
 
 def _ladder(length_mm: float) -> FloatArray:
