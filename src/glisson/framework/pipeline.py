@@ -181,6 +181,9 @@ def _current(
 
 def _put_in_place(moves: Sequence[tuple[Path, Path]], work: Path) -> None:
     """Rename files and folders to their places, all or none; what lay there goes into `work`."""
+    for source, _ in moves:
+        for entry in (source, *source.rglob("*")):
+            _flush(entry)
     undo: list[tuple[Path, Path]] = []
     try:
         for number, (source, place) in enumerate(moves):
@@ -195,6 +198,15 @@ def _put_in_place(moves: Sequence[tuple[Path, Path]], work: Path) -> None:
             if here.exists():
                 os.replace(here, there)
         raise
+
+
+def _flush(path: Path) -> None:
+    # Without this a power cut could leave a new name with nothing in it; a full disk shows here at the latest.
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def _keep_settings(case: Case, settings: Settings) -> None:

@@ -1,0 +1,179 @@
+"""The bad inputs of the issue through the commands: an exit code, one sentence, and the case as it was."""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dicom_samples import stored_values, write_series
+from glisson.cli.main import main
+from glisson.core.image import Grid, LabelMap
+from glisson.framework.case import ORGAN, SCAN, SETTINGS
+from glisson.io.images import write_labels, write_volume
+from small_case import GRID, contents, images, make_small_case, offer_bending, small_settings
+
+Refused = Callable[..., str]
+
+SHIFTED = Grid(GRID.shape, GRID.spacing_mm, GRID.origin_mm + np.array([0.0, 0.0, 3.0]))
+
+
+@pytest.fixture
+def refused(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Refused:
+    """Run a command that must fail with an exit code, leaving a folder as it is; its one sentence."""
+    offer_bending(monkeypatch)
+
+    def run(folder: Path, code: int, *words: Any) -> str:
+        before = contents(folder)
+        for as_json in (False, True):
+            found = main([*map(str, words), *(["--json"] if as_json else [])])
+            out, err = capfd.readouterr()
+            assert "Traceback" not in out + err
+            assert found == code, out + err
+            assert contents(folder) == before
+        said = json.loads(out)
+        assert (said["status"] == "bad_input") == (code == 2)
+        message: str = said["message"]
+        assert message.endswith(".")
+        assert "\n" not in message
+        return message
+
+    return run
+
+
+@pytest.fixture
+def meshed(meshed_small_case: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(meshed_small_case, tmp_path / "case"))
+
+
+def new(folder: Path, *words: Any) -> tuple[Any, ...]:
+    return ("new", folder / "case", "--ct", *words)
+
+
+def test_a_folder_without_dicom(tmp_path: Path, refused: Refused) -> None:
+    (tmp_path / "scan").mkdir()
+    (tmp_path / "scan" / "readme.txt").write_text("nothing here")
+    assert "DICOM" in refused(tmp_path, 2, *new(tmp_path, tmp_path / "scan"))
+    assert "does not exist" in refused(tmp_path, 2, *new(tmp_path, tmp_path / "nowhere"))
+
+
+def test_two_series_mixed(tmp_path: Path, refused: Refused) -> None:
+    write_series(tmp_path / "scan", stored_values(), prefix="a")
+    write_series(tmp_path / "scan", stored_values(), prefix="b")
+    assert "2 series" in refused(tmp_path, 2, *new(tmp_path, tmp_path / "scan"))
+
+
+def test_a_missing_slice(tmp_path: Path, refused: Refused) -> None:
+    paths = write_series(tmp_path / "scan", stored_values(8))
+    paths[4].unlink()
+    assert "slice" in refused(tmp_path, 2, *new(tmp_path, tmp_path / "scan"))
+
+
+def test_a_label_map_on_another_grid(tmp_path: Path, refused: Refused) -> None:
+    volume, groups = images()
+    write_volume(tmp_path / "scan.nii.gz", volume)
+    write_labels(tmp_path / "liver.nii.gz", LabelMap(groups["organ"].voxels, SHIFTED, {1: "liver"}))
+    words = new(tmp_path, tmp_path / "scan.nii.gz", "--labels", tmp_path / "liver.nii.gz")
+    assert "another grid" in refused(tmp_path, 2, *words)
+
+
+def test_a_label_map_on_another_grid_put_into_the_case(meshed: Path, refused: Refused) -> None:
+    _, groups = images()
+    write_labels(meshed / ORGAN, LabelMap(groups["organ"].voxels, SHIFTED, {1: "liver"}))
+    assert "grid" in refused(meshed, 2, "run", meshed)
+
+
+def test_a_reference_on_another_grid(meshed: Path, tmp_path: Path, refused: Refused) -> None:
+    _, groups = images()
+    write_labels(tmp_path / "liver.nii.gz", LabelMap(groups["organ"].voxels, SHIFTED, {1: "liver"}))
+    assert "another grid" in refused(meshed, 2, "segment", meshed, "--reference", tmp_path / "liver.nii.gz")
+
+
+def test_a_mask_with_two_components(tmp_path: Path, refused: Refused) -> None:
+    case = make_small_case(tmp_path / "case")
+    _, groups = images()
+    parts = groups["organ"].voxels.copy()
+    parts[28:34] = 0
+    write_labels(case.path(ORGAN), LabelMap(parts, GRID, {1: "liver"}))
+    for command in ("segment", "mesh", "run"):
+        assert "2 separate parts" in refused(case.folder, 2, command, case.folder)
+
+
+def test_an_empty_mask(tmp_path: Path, refused: Refused) -> None:
+    case = make_small_case(tmp_path / "case")
+    write_labels(case.path(ORGAN), LabelMap(np.zeros(GRID.shape, np.uint8), GRID, {1: "liver"}))
+    assert "empty" in refused(case.folder, 2, "run", case.folder)
+
+
+def test_a_mesh_that_cannot_be_made(tmp_path: Path, refused: Refused) -> None:
+    case = make_small_case(tmp_path / "case")
+    main(["segment", str(case.folder)])
+    # An envelope as wide as the organ: the mesh then loses its volume.
+    message = refused(case.folder, 1, "mesh", case.folder, "--mesh.envelope-mm", "10", "--mesh.edge-length-mm", "100")
+    assert "volume" in message
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("poisson_ratio = 0.5", "below 0.5"),
+        ("poisson_ratio = 0.7", "below 0.5"),
+        ("poisson_ratio = nan", "poisson_ratio"),
+        ("young_modulus_kpa = 0", "positive"),
+        ("young_modulus_kpa = -7", "positive"),
+        ("young_modulus_kpa = inf", "young_modulus_kpa"),
+        ('young_modulus_kpa = "soft"', "young_modulus_kpa"),
+        ("density_kg_m3 = -1", "Density"),
+        ('law = "jelly"', "jelly"),
+    ],
+)
+def test_a_material_out_of_range(meshed: Path, refused: Refused, line: str, words: str) -> None:
+    key = line.partition(" = ")[0]
+    lines = (meshed / SETTINGS).read_text().splitlines()
+    (meshed / SETTINGS).write_text("\n".join(line if entry.startswith(f"{key} =") else entry for entry in lines))
+    message = refused(meshed, 2, "run", meshed)
+    assert words in message
+    assert "jelly" in message or "materials.liver" in message
+
+
+@pytest.mark.parametrize(
+    ("part", "text", "words"),
+    [
+        (SETTINGS, "schema = 2", "newer Glisson"),
+        (SETTINGS, "schema = 1\n[mesh", "half-written"),
+        (SETTINGS, "schema = 1\ncolour = 'red'", "colour"),
+        (SETTINGS, 'schema = 1\ntarget = "tumour9"\n[simulate]\ntechnique = "bending"', "tumour9"),
+        (SCAN, "not an image", "ct.nii.gz"),
+        ("scenario.toml", "schema = 1\nstages = 3", "stages"),
+        ("scenario.toml", "", "scenario.toml"),
+    ],
+)
+def test_a_damaged_file(meshed: Path, refused: Refused, part: str, text: str, words: str) -> None:
+    if part == SETTINGS and "tumour9" in text:
+        text = (meshed / SETTINGS).read_text().replace("# target =", 'target = "tumour9"')
+        main(["simulate", str(meshed)])
+    (meshed / part).write_text(text)
+    assert words in refused(meshed, 2, "run", meshed)
+
+
+def test_no_case(tmp_path: Path, refused: Refused) -> None:
+    for command in ("segment", "mesh", "simulate", "navigate", "report", "run"):
+        assert "no case folder" in refused(tmp_path, 2, command, tmp_path / "nowhere")
+        assert "not a case folder" in refused(tmp_path, 2, command, tmp_path)
+
+
+def test_no_click_for_the_contour(tmp_path: Path, refused: Refused) -> None:
+    case = make_small_case(tmp_path / "case", small_settings().choosing("segment", "seeded-contour", {}))
+    case.path(ORGAN).unlink()
+    assert "seed" in refused(case.folder, 2, "run", case.folder)
+    assert "outside" in refused(case.folder, 2, "run", case.folder, "--seed-point", "900,0,0")
+
+
+def test_a_demo_never_overwrites(meshed: Path, tmp_path: Path, refused: Refused) -> None:
+    assert "not a demo" in refused(meshed, 2, "demo", "--out", meshed)
+    (tmp_path / "file").write_text("mine")
+    assert "not a demo" in refused(tmp_path, 2, "demo", "--out", tmp_path / "file")
+    assert "exists already" in refused(tmp_path, 2, "new", meshed, "--ct", meshed / SCAN)
