@@ -99,9 +99,10 @@ class FTetWild:
         log_path = target.with_name("log.txt")
         command = [sys.executable, "-m", "glisson.preoperative.ftetwild_process", str(source), str(target)]
         start = time.monotonic()
+        # The library leaves a file of its own in the folder where it runs.
         with (
             log_path.open("wb") as log,
-            subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log) as child,
+            subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, cwd=target.parent) as child,
         ):
             try:
                 while child.poll() is None:
