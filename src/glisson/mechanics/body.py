@@ -75,9 +75,14 @@ class Body:
         for contact, touch in zip(self.contacts, self.touches(positions, update_friction=False), strict=True):
             contact.update_cohesion(touch)
 
-    def drop_cohesion(self, positions: FloatArray) -> None:
-        """End the cohesion of surface points that no longer touch."""
-        for contact, touch in zip(self.contacts, self.touches(positions, update_friction=False), strict=True):
+    def add_cohesion(self, touches: Sequence[Touch]) -> None:
+        """Let cohesion begin at surface points that newly press."""
+        for contact, touch in zip(self.contacts, touches, strict=True):
+            contact.add_cohesion(touch)
+
+    def drop_cohesion(self, touches: Sequence[Touch]) -> None:
+        """End the cohesion of surface points that do not touch; it is not regained in this load step."""
+        for contact, touch in zip(self.contacts, touches, strict=True):
             contact.drop_cohesion(touch)
 
     def energy(self, positions: FloatArray) -> float:
@@ -113,6 +118,13 @@ class Body:
             used, local = contact.stiffness(touch, points, project)
             scatter_blocks(used, local, self.surface.shapes, self._pairs, blocks)
         return blocks
+
+    def add_bonds(self, positions: FloatArray, blocks: FloatArray) -> None:
+        """Glue what nearly touches to its tool, for the first guess of a body that nothing holds yet."""
+        points = self.surface.positions(positions)
+        for contact in self.contacts:
+            used, local = contact.bond(points)
+            scatter_blocks(used, local, self.surface.shapes, self._pairs, blocks)
 
     def upper(self, blocks: FloatArray) -> csr_matrix:
         """Upper triangle of the free unknowns' matrix."""

@@ -75,6 +75,11 @@ class ToolContact:
         self._cohesion[:] = 0.0
         self._cohesion[touch.points] = cohesion_share(touch.pressures)
 
+    def add_cohesion(self, touch: Touch) -> None:
+        """Let cohesion begin where points newly press."""
+        share = cohesion_share(touch.pressures)
+        self._cohesion[touch.points] = np.maximum(self._cohesion[touch.points], share)
+
     def drop_cohesion(self, touch: Touch) -> None:
         """End the cohesion of points that have left the tool."""
         left = np.ones_like(self.anchored)
@@ -138,6 +143,11 @@ class ToolContact:
         used = np.union1d(touch.points, slipping)
         local = blocks[used] * self._surface.areas[used, None, None]
         return used, touch.rotation @ local @ touch.rotation.T
+
+    def bond(self, points_mm: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Points (k,) nearly in touch, and blocks (k, 3, 3) in mN/mm that would glue them to the tool."""
+        near = np.flatnonzero(self.gaps(points_mm) < 2.0 * self.cushion.range_mm)
+        return near, (self.cushion.stiffness_kpa_mm * self._surface.areas[near])[:, None, None] * np.eye(3)
 
     def sticking(self, touch: Touch, points_mm: FloatArray) -> tuple[float, float]:
         """Share of the touching area that sticks, and the largest slip from an anchor (mm)."""

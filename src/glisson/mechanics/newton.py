@@ -15,17 +15,17 @@ from glisson.mechanics.linear_solvers import Factorisation
 _ARMIJO = 1e-4
 _HALVINGS = 40
 _ROUND_OFF = 1e-13  # share of the energy that may be lost to rounding in a difference of energies
-_COHESION_PASSES = 3
+_SETTLED_RESIDUAL = 0.1  # above it cohesion begins where points press, below it cohesion only ends
+_LONGEST_STEP = 0.05  # of the body's diagonal, for any node in one iteration
 _LONG_STEPS = 8  # steps at the length limit in a row before a free motion is looked for
 
 
 @dataclass(frozen=True)
 class NewtonSettings:
-    """Relative residual to reach, iterations allowed, and the longest step of any node in mm."""
+    """Relative residual to reach, and iterations allowed."""
 
     tolerance: float = 1e-6
     iteration_limit: int = 80
-    longest_step_mm: float = 15.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,41 +46,34 @@ class Newton:
         self._body = body
         self._factorisation = factorisation
         self._settings = settings
+        self._longest_step_mm = _LONGEST_STEP * float(np.linalg.norm(np.ptp(body.elasticity.rest, axis=0)))
 
     def solve(self, positions: FloatArray) -> NewtonEnd:
         """Equilibrium near `positions` with the body's present tools, loads and friction law.
 
-        Cohesion acts where tools pressed when the load step began, until a point leaves its tool.
+        Cohesion may begin at new points while the residual is large, and end while it is small: each only
+        in one direction, so that the iteration cannot cycle between the two.
         """
         body, settings = self._body, self._settings
-        long_steps = passes = 0
+        long_steps = 0
         for iteration in range(settings.iteration_limit + 1):
             touches = body.touches(positions)
             balance = body.balance(positions, touches)
+            (body.add_cohesion if balance.residual > _SETTLED_RESIDUAL else body.drop_cohesion)(touches)
             if balance.residual <= settings.tolerance:
-                passes += 1
-                if passes > _COHESION_PASSES or self._settled(positions):
-                    return NewtonEnd(positions, Status.CONVERGED, iteration, balance.residual)
-                continue
+                return NewtonEnd(positions, Status.CONVERGED, iteration, balance.residual)
             if iteration == settings.iteration_limit or long_steps == _LONG_STEPS:
                 break
             direction = self._direction(positions, touches, balance.unbalanced)
             if direction is None:
                 return self._ended(positions, Status.STAGNATED, iteration, balance)
-            longest = float(np.linalg.norm(direction, axis=1).max())
-            cap = min(1.0, settings.longest_step_mm / longest)
-            moved = self._search(positions, cap * direction, balance)
+            share = self._allowed_share(direction)
+            moved = self._search(positions, share * direction, balance)
             if moved is None:
                 return self._ended(positions, Status.STAGNATED, iteration, balance)
-            long_steps = long_steps + 1 if cap < 1.0 else 0
+            long_steps = long_steps + 1 if share < 1.0 else 0
             positions = moved
         return self._ended(positions, Status.ITERATION_LIMIT, iteration, balance)
-
-    def _settled(self, positions: FloatArray) -> bool:
-        """Whether the equilibrium still stands without the cohesion of points that left their tool."""
-        body = self._body
-        body.drop_cohesion(positions)
-        return body.balance(positions, body.touches(positions)).residual <= self._settings.tolerance
 
     def predict(self, positions: FloatArray, angles: Sequence[float], external: FloatArray) -> FloatArray:
         """First-order answer (n, 3) to turning the tools to `angles` and changing the dead loads.
@@ -94,7 +87,14 @@ class Newton:
         forces = body.balance(positions, touches).unbalanced + body.tool_motion_forces(positions, touches, angles)
         forces += np.where(body.fixed, 0.0, external - body.external)
         direction = self._direction(positions, touches, forces)
-        return np.zeros_like(positions) if direction is None else direction
+        if direction is None:
+            return np.zeros_like(positions)
+        return self._allowed_share(direction) * direction
+
+    def _allowed_share(self, direction: FloatArray) -> float:
+        """How much of a step may be taken: an organ that nothing holds yet must not fly away."""
+        longest = float(np.linalg.norm(direction, axis=1).max())
+        return min(1.0, self._longest_step_mm / longest) if longest > 0.0 else 1.0
 
     def _direction(self, positions: FloatArray, touches: Sequence[Touch], forces: FloatArray) -> FloatArray | None:
         """Newton's direction; the stiffness is made definite only when Cholesky refuses the exact one."""
@@ -104,6 +104,10 @@ class Newton:
             upper = body.upper(blocks)
             if self._factorisation.factor(upper):
                 return self._solved(forces)
+        body.add_bonds(positions, blocks)
+        upper = body.upper(blocks)
+        if self._factorisation.factor(upper):
+            return self._solved(forces)
         # A motion without stiffness is left: a small spring on every unknown keeps the step finite.
         diagonal = upper.diagonal()
         for share in (1e-8, 1e-6, 1e-4, 1e-2):
