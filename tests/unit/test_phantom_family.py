@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.ndimage import binary_dilation, binary_erosion
+from scipy.ndimage import binary_dilation, binary_erosion, gaussian_filter, label
 from skimage.measure import marching_cubes
 
 from glisson.core import BadInput, Grid
@@ -70,17 +70,19 @@ def test_hu_inside_eroded_structures(phantom):
     assert phantom.volume.voxels[trunk].mean() == pytest.approx(PORTAL_HU, abs=6.0)
     # Half a millimetre of steel in a voxel of 2 mm is still told from the parenchyma.
     assert phantom.volume.voxels[phantom.structures.mask("wire")].min() > LIVER_HU + 5 * NOISE_HU
-    duct = phantom.structures.mask("duct")
+    # Beyond the wire the duct is dark; it is as thin as two voxels.
+    duct = phantom.structures.mask("duct") & ~binary_dilation(phantom.structures.mask("wire"), iterations=3)
     assert DUCT_HU < phantom.volume.voxels[duct].mean() < 0.75 * LIVER_HU
 
 
-def test_neighbours_look_like_liver(phantom):
-    """Muscle, stomach wall or heart touch the liver: a threshold alone must leak."""
-    voxels = phantom.volume.voxels
+def test_a_threshold_leaks(phantom):
+    """Muscle, stomach wall, heart and spleen look like liver and touch it: connected voxels of its HU are not it."""
     liver = phantom.organ.mask("liver")
-    similar = (voxels > LIVER_HU - 35) & (voxels < LIVER_HU + 35)
-    rim = binary_dilation(liver, iterations=3) & ~binary_dilation(liver, iterations=1)
-    assert similar[rim].mean() > 0.1
+    smooth = gaussian_filter(phantom.volume.voxels.astype(np.float32), 1.0)
+    parts, _ = label((smooth > LIVER_HU - 45) & (smooth < LIVER_HU + 45))
+    inside_liver = np.bincount(parts[liver])[1:].argmax() + 1
+    leaked = (parts == inside_liver) & ~binary_dilation(liver)
+    assert leaked.sum() > 0.1 * liver.sum()
 
 
 def test_organ_mask_has_the_surface_volume(phantom, liver_surface):
@@ -132,7 +134,7 @@ def _centre(phantom, number):
     return phantom.couinaud.grid.points_from_indices(voxels).mean(axis=0)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(4))
 def test_interior_lies_inside(seed):
     anatomy = build_anatomy(seed)
     liver, interior = anatomy.shape.liver, anatomy.interior
@@ -178,18 +180,19 @@ def test_resection_rule_has_room(phantom):
 
 
 def test_same_seed_same_bytes():
-    first, second = (make_phantom(4, (4.0, 4.0, 5.0)) for _ in range(2))
+    first, second = (make_phantom(4, (6.0, 6.0, 6.0)) for _ in range(2))
     assert first.volume.voxels.tobytes() == second.volume.voxels.tobytes()
     assert first.structures.voxels.tobytes() == second.structures.voxels.tobytes()
     np.testing.assert_array_equal(first.exact.duct.points_mm, second.exact.duct.points_mm)
 
 
 def test_seeds_differ():
-    volumes = [make_phantom(seed, (5.0, 5.0, 5.0)).organ.volume_ml("liver") for seed in range(4)]
-    assert min(abs(a - b) for i, a in enumerate(volumes) for b in volumes[:i]) > 3.0
+    first, second = (make_phantom(seed, (6.0, 6.0, 6.0)) for seed in (0, 2))
+    assert (first.organ.voxels != second.organ.voxels).sum() > 0.03 * first.organ.voxels.sum()
+    assert not np.array_equal(first.volume.voxels, second.volume.voxels)
 
 
-def test_oblique_grid_shows_the_same_organ():
+def test_oblique_grid_shows_the_same_organ(phantom):
     angle = 0.3
     turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
     turn = turn @ np.diag([-1.0, -1.0, 1.0])  # right-handed, as a RAS scan has it
@@ -197,9 +200,8 @@ def test_oblique_grid_shows_the_same_organ():
     centre = np.array([-22.0, -38.0, 0.0])
     grid = Grid(shape, spacing, centre - turn @ (spacing * (np.array(shape) - 1) / 2.0), turn)
     oblique = make_phantom(1, grid=grid)
-    straight = make_phantom(1, (2.5, 2.5, 3.0))
-    assert oblique.organ.volume_ml("liver") == pytest.approx(straight.organ.volume_ml("liver"), rel=0.005)
-    centres = [p.organ.grid.points_from_indices(np.argwhere(p.organ.voxels)).mean(axis=0) for p in (oblique, straight)]
+    assert oblique.organ.volume_ml("liver") == pytest.approx(phantom.organ.volume_ml("liver"), rel=0.005)
+    centres = [p.organ.grid.points_from_indices(np.argwhere(p.organ.voxels)).mean(axis=0) for p in (oblique, phantom)]
     np.testing.assert_allclose(centres[0], centres[1], atol=0.2)
 
 

@@ -64,8 +64,10 @@ def scan_grid(spacing_mm: Sequence[float]) -> Grid:
     spacing = np.asarray(spacing_mm, dtype=np.float64)
     if spacing.shape != (3,) or not (np.all(spacing >= 0.3) and np.all(spacing <= 10.0)):
         raise BadInput(f"The phantom's voxel spacing must be three lengths of 0.3 to 10 mm, not {spacing.tolist()}.")
-    shape = np.ceil((BODY_BOX[1] - BODY_BOX[0]) / spacing).astype(int)
-    return Grid((int(shape[0]), int(shape[1]), int(shape[2])), spacing, BODY_BOX[0] + spacing / 2.0)
+    # Zero lies on a voxel face: centres half a voxel off the flat underside count its volume without bias.
+    first, last = np.floor(BODY_BOX[0] / spacing), np.ceil(BODY_BOX[1] / spacing)
+    shape = (last - first).astype(int)
+    return Grid((int(shape[0]), int(shape[1]), int(shape[2])), spacing, (first + 0.5) * spacing)
 
 
 def scanned_structures(interior: Interior, loading: Loading | None) -> Structures:

@@ -7,6 +7,7 @@ nodes of the same mesh as T10 the displacements in mm `rest_to_a`, and `stages` 
 
 from dataclasses import dataclass
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -64,6 +65,6 @@ def read_truth(path: Path) -> Truth:
                 for name, displacement in zip(stored["names"], stored["stages"], strict=True)
             )
             note = str(stored["note"])
-    except (OSError, KeyError, ValueError) as error:
+    except (OSError, KeyError, ValueError, BadZipFile) as error:
         raise BadInput(f"{path.name} is not a truth file ({error}); make it anew with its script.") from error
     return Truth(loading, Deformation(scanned, stages, Status.CONVERGED, note))
