@@ -7,11 +7,12 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib.metadata import requires
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
 
-from glisson.core.mesh import TetMesh
+from glisson.core.mesh import TetMesh, signed_volumes
 from glisson.core.model import Material, Model
 from glisson.core.registry import list_techniques, make_technique
 from glisson.core.scenario import ContactLaw, Scenario, Stage
@@ -116,15 +117,11 @@ def _column_under_its_weight() -> str:
 
 
 def _column(length: float, material: Material) -> Model:
-    """A square column of four cubes along z, six tetrahedra each."""
-    steps = np.array([(i, j, k) for k in range(5) for j in range(2) for i in range(2)], dtype=float)
-    nodes = steps * length / 4.0
-    # Kuhn's subdivision: the six orders in which one can walk from a cube's corner to the opposite one.
-    walks = [(1, 2, 4), (2, 1, 4), (2, 4, 1), (4, 2, 1), (4, 1, 2), (1, 4, 2)]
-    cells = []
-    for n, (a, b, _) in enumerate(walks):
-        cell = (0, a, a + b, 7) if n % 2 == 0 else (0, a + b, a, 7)
-        cells += [[4 * layer + corner for corner in cell] for layer in range(4)]
-    mesh = TetMesh(nodes, np.array(cells))
+    """A square column of four cubes along z, each cut into the six tetrahedra between two opposite corners."""
+    nodes = length / 4.0 * np.array([(i, j, k) for k in range(5) for j in (0, 1) for i in (0, 1)], dtype=float)
+    paths = np.array([(0, a, a + b, 7) for a, b, _ in permutations((1, 2, 4))])
+    cells = np.concatenate([paths + 4 * layer for layer in range(4)])
+    turned = signed_volumes(nodes, cells) < 0.0
+    cells[turned] = cells[turned][:, [0, 2, 1, 3]]
     sets = {"top": np.arange(16, 20), "bottom": np.arange(4)}
-    return Model(mesh, {0: material}, {0: "column"}, sets)
+    return Model(TetMesh(nodes, cells), {0: material}, {0: "column"}, sets)

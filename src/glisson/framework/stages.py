@@ -242,26 +242,33 @@ class ReportStage(Stage):
 
     def run(self, case: Case, settings: Settings, out: Path, progress: Progress) -> Mapping[str, Any]:
         """Write the report; no facts."""
-        model, deformation, truth = read_model(case.path(MODEL)), read_deformation(case.path(RESULTS)), _truth(case)
-        plan = plan_of(settings)
-        records = _records(case)
-        inputs = ReportInputs(
-            title="Guidance for a liver",
-            model=model,
-            scenario=read_scenario(case.path(SCENARIO)),
-            deformation=deformation,
-            guidance=navigate(model, deformation, plan, truth),
-            plan=plan,
-            volume=read_volume(case.path(SCAN)),
-            organ=_labels(case, ORGAN),
-            tumours=_labels(case, TUMOURS),
-            structures=_labels(case, STRUCTURES),
-            truth=truth,
-            provenance={name: record.summary() for name, record in records.items()},
-            seconds={name: record.seconds for name, record in records.items()},
-        )
-        write_report(out / REPORT, inputs)
+        write_report(out / REPORT, report_inputs(case, settings))
         return {}
+
+
+def report_inputs(case: Case, settings: Settings) -> ReportInputs:
+    """What the report of a case is made of.
+
+    Raises:
+        BadInput: a result that it needs is missing or damaged.
+    """
+    model, deformation, truth = read_model(case.path(MODEL)), read_deformation(case.path(RESULTS)), _truth(case)
+    plan, records = plan_of(settings), _records(case)
+    return ReportInputs(
+        title="Guidance for a liver",
+        model=model,
+        scenario=read_scenario(case.path(SCENARIO)),
+        deformation=deformation,
+        guidance=navigate(model, deformation, plan, truth),
+        plan=plan,
+        volume=read_volume(case.path(SCAN)),
+        organ=_labels(case, ORGAN),
+        tumours=_labels(case, TUMOURS),
+        structures=_labels(case, STRUCTURES),
+        truth=truth,
+        provenance={name: record.summary() for name, record in records.items()},
+        seconds={name: record.seconds for name, record in records.items()},
+    )
 
 
 def plan_of(settings: Settings) -> Plan:
