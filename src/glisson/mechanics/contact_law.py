@@ -8,10 +8,10 @@ a tool may move millimetres in one step and Newton's method pulls the organ afte
 
 Tangential direction: |τ| ≤ limit = friction · p + cohesion · χ(p), where χ rises from 0 to 1 over the
 first `COHESION_ONSET_KPA` of pressure: cohesion is shear only and needs touch. That slope is so steep that
-χ may not follow the pressure freely within a load step (Newton's method would cycle); see `Newton.solve`. A point sticks to its
-anchor on the tool like a stiff spring until the limit is reached over `stick_mm` of slip (the C1 law of
-Li et al., Incremental Potential Contact, 2020, section 5). Anchors stay over load steps and are dragged
-only as far as the point really slipped; a held body therefore does not creep.
+χ may not follow the pressure freely within a load step (Newton's method would cycle); see `Newton.solve`.
+A point sticks to its anchor on the tool like a stiff spring until the limit is reached over `stick_mm` of
+slip (the C1 law of Li et al., Incremental Potential Contact, 2020, section 5). Anchors stay over load
+steps and are dragged only as far as the point really slipped; a held body therefore does not creep.
 """
 
 from dataclasses import dataclass

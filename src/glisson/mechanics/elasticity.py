@@ -1,9 +1,13 @@
 """Elastic energy, internal forces and stiffness of the organ, assembled over its elements."""
 
-from collections.abc import Mapping
+import os
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.mesh import TetMesh
@@ -13,6 +17,22 @@ from glisson.mechanics.materials.law import Law, find_law
 from glisson.mechanics.pattern import BlockPattern
 
 _CHUNK = 4096  # elements whose tangents and stiffness are held at once (about 40 MB for T10)
+_CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+T = TypeVar("T")
+
+# Threads and not compiled parallel loops: these wait in turns that cost milliseconds on a busy machine.
+_threads = ThreadPoolExecutor(_CORES, thread_name_prefix="glisson-elasticity")
+
+
+@dataclass(frozen=True, eq=False)
+class _Chunk:
+    """Elements of one region that are worked on together."""
+
+    elements: IntArray
+    law: Law
+    material: Material
 
 
 class Elasticity:
@@ -29,32 +49,36 @@ class Elasticity:
         self.rest = rest
         self._quadrature = quadrature(rest, mesh)
         # Elements are taken region by region, in chunks, so that each chunk has one law.
-        self._chunks: list[tuple[IntArray, Law, Material]] = []
+        self._chunks: list[_Chunk] = []
+        size = min(_CHUNK, -(-len(mesh.tetrahedra) // _CORES))
         for region in np.unique(mesh.region_numbers):
             elements = np.flatnonzero(mesh.region_numbers == region)
             law = find_law(materials[int(region)].law)
-            parts = np.array_split(elements, max(1, -(-len(elements) // _CHUNK)))
-            self._chunks += [(part, law, materials[int(region)]) for part in parts]
+            parts = np.array_split(elements, -(-len(elements) // size))
+            self._chunks += [_Chunk(part, law, materials[int(region)]) for part in parts]
 
     def energy(self, positions: FloatArray) -> float:
         """Strain energy in µJ at node positions (n, 3); infinite where an element is inverted."""
-        total = 0.0
-        for elements, law, material in self._chunks:
-            gradients = self._gradients(positions, elements)
-            density = law.energy(gradients.reshape(-1, 3, 3), material)
-            total += float(density @ self._quadrature.weights[elements].ravel())
-        return total
+
+        def part(chunk: _Chunk) -> float:
+            gradients = self._gradients(positions, chunk.elements).reshape(-1, 3, 3)
+            weights = self._quadrature.weights[chunk.elements].ravel()
+            return float(chunk.law.energy(gradients, chunk.material) @ weights)
+
+        return sum(self._each_chunk(part))
 
     def forces(self, positions: FloatArray) -> FloatArray:
         """Internal forces ∂Ψ/∂x (n, 3) in mN."""
-        forces = np.zeros_like(positions)
-        for elements, law, material in self._chunks:
-            gradients = self._gradients(positions, elements)
-            stress = law.stress(gradients.reshape(-1, 3, 3), material).reshape(gradients.shape)
-            parts = _element_forces(stress, self._quadrature.gradients, self._quadrature.weights, elements)
-            flat = self.mesh.tetrahedra[elements].ravel()
-            for i in range(3):
-                forces[:, i] += np.bincount(flat, parts[:, :, i].ravel(), minlength=len(forces))
+
+        def part(chunk: _Chunk) -> FloatArray:
+            gradients = self._gradients(positions, chunk.elements)
+            stress = chunk.law.stress(gradients.reshape(-1, 3, 3), chunk.material).reshape(gradients.shape)
+            parts = _element_forces(stress, self._quadrature.gradients, self._quadrature.weights, chunk.elements)
+            flat = self.mesh.tetrahedra[chunk.elements].ravel()
+            count = len(positions)
+            return np.stack([np.bincount(flat, parts[:, :, i].ravel(), minlength=count) for i in range(3)], axis=1)
+
+        forces: FloatArray = np.sum(self._each_chunk(part), axis=0)
         return forces
 
     def add_stiffness(self, positions: FloatArray, pattern: BlockPattern, blocks: FloatArray, project: bool) -> None:
@@ -63,14 +87,24 @@ class Elasticity:
         With `project`, negative eigenvalues of each point's ∂P/∂F are cut, which makes the sum positive
         semi-definite (Teran et al. 2005).
         """
-        for elements, law, material in self._chunks:
-            gradients = self._gradients(positions, elements)
-            tangents = law.tangent(gradients.reshape(-1, 3, 3), material)
+
+        def part(chunk: _Chunk) -> FloatArray:
+            gradients = self._gradients(positions, chunk.elements).reshape(-1, 3, 3)
+            tangents = chunk.law.tangent(gradients, chunk.material)
             if project:
                 _cut_negative(tangents)
-            weights = self._quadrature.weights[elements]
-            parts = _element_stiffness(tangents, self._quadrature.gradients, weights, elements)
-            _scatter_stiffness(parts, pattern.slots, elements, blocks)
+            weights = self._quadrature.weights[chunk.elements]
+            stiffness: FloatArray = _element_stiffness(tangents, self._quadrature.gradients, weights, chunk.elements)
+            return stiffness
+
+        # As many chunks at a time as there are cores, so that memory stays bounded.
+        for first in range(0, len(self._chunks), _CORES):
+            chunks = self._chunks[first : first + _CORES]
+            for chunk, parts in zip(chunks, _threads.map(part, chunks), strict=True):
+                _scatter_stiffness(parts, pattern.slots, chunk.elements, blocks)
+
+    def _each_chunk(self, work: Callable[[_Chunk], T]) -> list[T]:
+        return list(_threads.map(work, self._chunks))
 
     def jacobians(self, positions: FloatArray) -> FloatArray:
         """J = det F (m, q) at the quadrature points."""
@@ -85,13 +119,13 @@ class Elasticity:
         return result
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, nogil=True)
 def _deformation_gradients(
     positions: FloatArray, tetrahedra: IntArray, gradients: FloatArray, elements: IntArray
 ) -> FloatArray:
     points, size = gradients.shape[1], gradients.shape[2]
     result = np.zeros((len(elements), points, 3, 3))
-    for n in prange(len(elements)):
+    for n in range(len(elements)):
         e = elements[n]
         for q in range(points):
             for a in range(size):
@@ -102,11 +136,11 @@ def _deformation_gradients(
     return result
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, nogil=True)
 def _element_forces(stress: FloatArray, gradients: FloatArray, weights: FloatArray, elements: IntArray) -> FloatArray:
     points, size = gradients.shape[1], gradients.shape[2]
     result = np.zeros((len(elements), size, 3))
-    for n in prange(len(elements)):
+    for n in range(len(elements)):
         e = elements[n]
         for q in range(points):
             for a in range(size):
@@ -118,14 +152,14 @@ def _element_forces(stress: FloatArray, gradients: FloatArray, weights: FloatArr
     return result
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, nogil=True)
 def _element_stiffness(
     tangents: FloatArray, gradients: FloatArray, weights: FloatArray, elements: IntArray
 ) -> FloatArray:
     """Sum w ∇Nᵀ A ∇N of each element as (k, nodes, nodes, 3, 3)."""
     points, size = gradients.shape[1], gradients.shape[2]
     result = np.zeros((len(elements), size, size, 3, 3))
-    for n in prange(len(elements)):
+    for n in range(len(elements)):
         e = elements[n]
         half = np.zeros((3, 3, 3))
         for q in range(points):
@@ -148,7 +182,7 @@ def _element_stiffness(
     return result
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _scatter_stiffness(parts: FloatArray, slots: IntArray, elements: IntArray, blocks: FloatArray) -> None:
     for n in range(len(elements)):
         for a in range(parts.shape[1]):
@@ -156,9 +190,9 @@ def _scatter_stiffness(parts: FloatArray, slots: IntArray, elements: IntArray, b
                 blocks[slots[elements[n], a, b]] += parts[n, a, b]
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, nogil=True)
 def _cut_negative(tangents: FloatArray) -> None:
-    for n in prange(len(tangents)):
+    for n in range(len(tangents)):
         values, vectors = np.linalg.eigh(tangents[n])
         if values[0] < 0.0:
             tangents[n] = (vectors * np.maximum(values, 0.0)) @ vectors.T

@@ -25,7 +25,7 @@ class NewtonSettings:
     """Relative residual to reach, and iterations allowed."""
 
     tolerance: float = 1e-6
-    iteration_limit: int = 80
+    iteration_limit: int = 40
 
 
 @dataclass(frozen=True, eq=False)

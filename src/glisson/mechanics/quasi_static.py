@@ -24,7 +24,7 @@ from glisson.mechanics.rest_shape import RestShape, find_rest_shape
 from glisson.mechanics.stages import StageRunner, fixed_unknowns, gravity_forces
 from glisson.mechanics.tools import make_tool
 
-_CUSHION_STIFFNESS_KPA = 200.0  # over the range; see `Cushion`
+_CUSHION_STIFFNESS_KPA = 60.0  # over the range; see `Cushion`
 _CUSHION_STIFFNESS_MODULI = 3.0
 
 
@@ -42,7 +42,7 @@ class QuasiStaticParameters:
     surface_tolerance_mm: float = parameter(
         2.0, "how far in mm the scanned surface may lie from a tool and still be taken as touching it", 0.0, 10.0
     )
-    iteration_limit: int = parameter(80, "Newton iterations allowed in one load step", 1, 10_000)
+    iteration_limit: int = parameter(40, "Newton iterations allowed in one load step", 1, 10_000)
 
 
 class QuasiStatic:

@@ -21,6 +21,8 @@ from glisson.mechanics.tools import LeverTool
 
 _SMALLEST_SHARE = 1.0 / 256.0  # of a stage: smaller load steps are not tried
 _LOAD_STEPS = 4  # for a change of gravity
+_FIRST_SHARE = 0.1  # of a full load step, for the first one: the tool only just comes to bear
+_GROWTH = 2.0
 _STIFFENINGS = 6
 _FORCE_ACCURACY = 1e-3
 _LARGEST_ANGLE = radians(90.0)
@@ -88,7 +90,7 @@ class StageRunner:
         steps = max(int(np.ceil(turn / self._step - 1e-9)), 1)
         if np.linalg.norm(target.external - start.external) > 1e-9 * np.linalg.norm(target.external):
             steps = max(steps, _LOAD_STEPS)
-        done, share = 0.0, 1.0 / steps
+        done, share = 0.0, _FIRST_SHARE / steps if turn > 0.0 else 1.0 / steps
         while done < 1.0:
             reach = min(done + share, 1.0)
             self._progress((self._number + reach) / len(self._scenario.stages), self._words(stage))
@@ -96,7 +98,7 @@ class StageRunner:
             if end.status is Status.CONVERGED:
                 done = 1.0 if reach > 1.0 - 1e-9 else reach
                 self._accept(stage, done, end)
-                share = min(share * 1.5, 1.0 / steps)
+                share = min(share * _GROWTH, 1.0 / steps)
             elif end.status is Status.SINGULAR or share / 2.0 < _SMALLEST_SHARE / steps:
                 self._note(stage, reach, end)
                 return end

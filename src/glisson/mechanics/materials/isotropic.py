@@ -1,19 +1,19 @@
 """What compressible neo-Hookean laws share: P = a F + b G and its tangent, with G = F⁻ᵀ."""
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from glisson.core.arrays import FloatArray
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, nogil=True)
 def kinematics(gradients: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """J = det F (n,), I1 = F : F (n,) and G = F⁻ᵀ (n, 3, 3); G is zero where J ≤ 0."""
     count = gradients.shape[0]
     jacobians = np.zeros(count)
     first = np.zeros(count)
     inverse_transposes = np.zeros((count, 3, 3))
-    for n in prange(count):
+    for n in range(count):
         f = gradients[n]
         g = inverse_transposes[n]
         for i in range(3):
@@ -28,16 +28,16 @@ def kinematics(gradients: FloatArray) -> tuple[FloatArray, FloatArray, FloatArra
     return jacobians, first, inverse_transposes
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, nogil=True)
 def combined_stress(gradients: FloatArray, inverse_transposes: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
     """P = a F + b G, (n, 3, 3); `a` and `b` are (n,)."""
     stress = np.zeros_like(gradients)
-    for n in prange(len(a)):
+    for n in range(len(a)):
         stress[n] = a[n] * gradients[n] + b[n] * inverse_transposes[n]
     return stress
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, nogil=True)
 def combined_tangent(
     gradients: FloatArray,
     inverse_transposes: FloatArray,
@@ -48,7 +48,7 @@ def combined_tangent(
 ) -> FloatArray:
     """α δ_ik δ_JL + β G_iJ G_kL + γ (F_iJ G_kL + G_iJ F_kL) + ζ G_iL G_kJ as (n, 9, 9)."""
     tangent = np.zeros((len(alpha), 9, 9))
-    for n in prange(len(alpha)):
+    for n in range(len(alpha)):
         f, g = gradients[n], inverse_transposes[n]
         for i in range(3):
             for j in range(3):
