@@ -76,7 +76,7 @@ def evolve(
     start: NDArray[np.bool_],
     spacing_mm: FloatArray,
     parameters: LocalizedContourParameters,
-    barrier: FloatArray | None = None,
+    freedom_mm: float | None = None,
 ) -> ContourResult:
     """Let a contour flow from the border of a mask until it rests.
 
@@ -85,7 +85,7 @@ def evolve(
         start: the mask that it starts from, same shape.
         spacing_mm: pixel or voxel spacing, one number for each axis.
         parameters: forces and stop.
-        barrier: signed distance in mm, negative inside, that the contour may not leave.
+        freedom_mm: how far the contour may get from its start, to either side; None: as far as it likes.
 
     Raises:
         BadInput: shapes differ, or the start is empty or everything.
@@ -99,9 +99,8 @@ def evolve(
     box = _reachable_box(start, np.asarray(spacing_mm, dtype=np.float64), parameters)
     shape = start[box].shape if image.ndim == 3 else (1, *start[box].shape)
     phi = signed_distance_of_mask(start[box], spacing_mm).reshape(shape)
-    wall = None if barrier is None else barrier[box].reshape(shape)
     flow = _Flow(image[box].reshape(shape).astype(np.float32), spacing, parameters, image.ndim)
-    final, iterations, converged = flow.run(phi, wall)
+    final, iterations, converged = flow.run(phi, freedom_mm)
     contour = np.abs(final) <= flow.epsilon
     moved = float(np.abs(final - phi)[contour].mean()) if contour.any() else 0.0
     whole = np.full(start.shape, flow.band)
@@ -135,14 +134,14 @@ class _Flow:
         self.band = 3.0 * self.epsilon
         self._ball = ball_rows(parameters.radius_mm, spacing, dimensions)
 
-    def run(self, phi: FloatArray, barrier: FloatArray | None) -> tuple[FloatArray, int, bool]:
+    def run(self, start: FloatArray, freedom_mm: float | None) -> tuple[FloatArray, int, bool]:
         """The contour at rest, the iterations made and whether it rests."""
-        phi = reinitialised(phi, self._spacing, self.band)
+        phi = reinitialised(start, self._spacing, self.band)
         watched = phi
         for iteration in range(1, self._parameters.iterations + 1):
             phi = self._stepped(phi)
-            if barrier is not None:
-                phi = np.maximum(phi, barrier)
+            if freedom_mm is not None:
+                phi = np.clip(phi, start - freedom_mm, start + freedom_mm)
             if not (phi < 0.0).any():
                 return phi, iteration, True
             if iteration % 2 == 0:

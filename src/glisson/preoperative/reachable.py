@@ -1,0 +1,131 @@
+"""The part of the organ's grey-value band that belongs together with a click.
+
+Organs with the same grey value touch. Where they do the touching part is narrow compared with the organs
+on both sides, and mostly their grey values differ a little. So the band is divided into basins of its
+distance map (watershed, Beucher and Lantuéjoul 1979), which are joined from the widest passage down:
+the narrower the passage and the larger the difference, the less so.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+from skimage.morphology import h_maxima
+from skimage.segmentation import watershed
+
+from glisson.core.arrays import FloatArray, IntArray
+from glisson.preoperative.intensity_prior import SOFT_TISSUE_HU, IntensityPrior
+
+_NARROWEST_PASSAGE = 0.45
+"""Basins of equal grey value are joined when the passage is this fraction as wide as the smaller basin …"""
+
+_PASSAGE_PER_HU = 0.06
+""" … and by this much more for each HU between them."""
+
+_VESSEL_AREA_MM2 = 250.0
+"""Gaps of the band that are surrounded in a plane and smaller than this are vessels or small tumours."""
+
+_DETAIL_MM = 6.0
+"""Radius below which what hangs on the organ is taken for something else (opening)."""
+
+
+def reachable_region(
+    smooth: NDArray[np.float32], prior: IntensityPrior, spacing_mm: FloatArray, seeds: list[tuple[int, int, int]]
+) -> NDArray[np.bool_]:
+    """The organ as far as grey value and shape tell it, (a, b, c); empty when no tissue is near the seeds.
+
+    Args:
+        smooth: smoothed grey values (a, b, c).
+        prior: the organ's grey values.
+        spacing_mm: voxel spacing (3,).
+        seeds: voxels clicked; the basins nearest to them are the organ's.
+    """
+    band = np.abs(smooth - prior.mean) < prior.half_width
+    filled = _without_vessel_gaps(band, spacing_mm) & (smooth > SOFT_TISSUE_HU[0])
+    distance = ndimage.distance_transform_edt(filled, sampling=spacing_mm)
+    width = ndimage.gaussian_filter(distance.astype(np.float32), 1.5 / spacing_mm) * filled
+    markers, count = ndimage.label(h_maxima(width, 0.7))  # type: ignore[no-untyped-call]
+    if count == 0:
+        return np.zeros(band.shape, dtype=bool)
+    basins = watershed(-width, markers, mask=filled).astype(np.int64)  # type: ignore[no-untyped-call]
+    values = np.where(band, smooth, np.float32(prior.mean))
+    joined = _joined_basins(basins, count, width, values)
+    own = {int(joined[_nearest_label(basins, seed, spacing_mm)]) for seed in seeds}
+    region = np.isin(joined[basins], list(own)) & (basins > 0)
+    return opened(region, spacing_mm, _DETAIL_MM)
+
+
+def opened(region: NDArray[np.bool_], spacing_mm: FloatArray, radius_mm: float) -> NDArray[np.bool_]:
+    """The largest part of a region that a ball of this radius reaches, and a millimetre about it."""
+    cores, count = ndimage.label(ndimage.distance_transform_edt(region, sampling=spacing_mm) > radius_mm)
+    if count == 0:
+        return np.zeros(region.shape, dtype=bool)
+    core = cores == int(np.argmax(np.bincount(cores.ravel())[1:])) + 1
+    result: NDArray[np.bool_] = region & (ndimage.distance_transform_edt(~core, sampling=spacing_mm) < radius_mm + 1.0)
+    return result
+
+
+def _without_vessel_gaps(band: NDArray[np.bool_], spacing_mm: FloatArray) -> NDArray[np.bool_]:
+    """Small gaps filled that are surrounded in a plane along two axes: cross-sections of vessels."""
+    filled = band.copy()
+    for axis in (2, 0, 1):
+        in_plane = ndimage.generate_binary_structure(3, 1)
+        in_plane[tuple([0, 2] if a == axis else slice(None) for a in range(3))] = False
+        gaps, count = ndimage.label(~filled, structure=in_plane)
+        areas = np.bincount(gaps.ravel(), minlength=count + 1) * float(np.prod(np.delete(spacing_mm, axis)))
+        small = areas < _VESSEL_AREA_MM2
+        small[0] = False
+        filled |= small[gaps]
+    return filled
+
+
+def _joined_basins(basins: IntArray, count: int, width: FloatArray, values: NDArray[np.float32]) -> IntArray:
+    """For each basin 0 … count the number of the group that it is joined to, (count + 1,)."""
+    numbers = np.arange(count + 1)
+    widest = np.asarray(ndimage.maximum(width, basins, numbers), dtype=np.float64)
+    level = np.asarray(ndimage.median(values, basins, numbers), dtype=np.float64)
+    size = np.bincount(basins.ravel(), minlength=count + 1).astype(np.float64)
+    group = numbers.copy()
+    for passage, first, second in _passages(basins, count, width):
+        a, b = _root(group, first), _root(group, second)
+        if a == b:
+            continue
+        needed = _NARROWEST_PASSAGE + _PASSAGE_PER_HU * abs(level[a] - level[b])
+        if passage >= needed * min(widest[a], widest[b]):
+            group[b] = a
+            widest[a] = max(widest[a], widest[b])
+            level[a] = (level[a] * size[a] + level[b] * size[b]) / (size[a] + size[b])
+            size[a] += size[b]
+    return np.array([_root(group, n) for n in range(count + 1)], dtype=np.int64)
+
+
+def _root(group: IntArray, basin: int) -> int:
+    while group[basin] != basin:
+        group[basin] = group[group[basin]]
+        basin = int(group[basin])
+    return basin
+
+
+def _passages(basins: IntArray, count: int, width: FloatArray) -> list[tuple[float, int, int]]:
+    """Largest width on the border of each pair of touching basins, the widest first."""
+    widest: dict[int, float] = {}
+    for axis in range(3):
+        before = tuple(slice(None, -1) if a == axis else slice(None) for a in range(3))
+        after = tuple(slice(1, None) if a == axis else slice(None) for a in range(3))
+        first, second = basins[before], basins[after]
+        touching = (first != second) & (first > 0) & (second > 0)
+        low, high = np.minimum(first, second)[touching], np.maximum(first, second)[touching]
+        keys, place = np.unique(low * (count + 1) + high, return_inverse=True)
+        largest = np.zeros(len(keys))
+        np.maximum.at(largest, place, np.minimum(width[before], width[after])[touching])
+        for key, value in zip(keys.tolist(), largest.tolist(), strict=True):
+            widest[key] = max(widest.get(key, 0.0), value)
+    pairs = [(value, key // (count + 1), key % (count + 1)) for key, value in widest.items()]
+    return sorted(pairs, reverse=True)
+
+
+def _nearest_label(basins: IntArray, seed: tuple[int, int, int], spacing_mm: FloatArray) -> int:
+    if basins[seed]:
+        return int(basins[seed])
+    cells = np.argwhere(basins > 0)
+    nearest = np.argmin((((cells - seed) * spacing_mm) ** 2).sum(axis=1))
+    return int(basins[tuple(cells[nearest])])

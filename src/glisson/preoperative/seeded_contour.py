@@ -1,0 +1,179 @@
+"""The liver from a CT and one click: localized contours from slice to slice, guarded by grey value and shape.
+
+The click gives the liver's grey values; what of their band belongs together with it, by the width of
+passages and the grey value, is the region that the contours start from (`reachable`), completed by
+surface tumours (`completion`). The contours run from the largest slice to both ends (`propagation`).
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from glisson.core.arrays import FloatArray
+from glisson.core.errors import BadInput, StageFailed
+from glisson.core.image import Grid, LabelMap, Volume
+from glisson.core.parameters import parameter
+from glisson.core.protocols import Progress, Segmentation, silent
+from glisson.core.status import Status
+from glisson.preoperative.borders import touched_borders
+from glisson.preoperative.completion import with_surface_tumours, without_gaps
+from glisson.preoperative.diffusion import diffused
+from glisson.preoperative.intensity_prior import IntensityPrior, estimate_prior
+from glisson.preoperative.localized_contour import LocalizedContourParameters
+from glisson.preoperative.propagation import propagate
+from glisson.preoperative.reachable import opened, reachable_region
+from glisson.preoperative.slice_flags import flag_slices
+from glisson.preoperative.working_grid import WorkingGrid
+
+_VISIBLE_HU = (-300.0, 400.0)
+"""Air and bone are cut to this range before smoothing."""
+
+_CONTOUR_RANGE = 3.0
+"""The contour sees grey values up to so many half widths of the liver's band: lung would blind it to fat."""
+
+_EDGE_HU = 20.0
+_SMOOTHING_STEPS = 6
+_GAP_MM = 4.0
+_SMALLEST_ML = 5.0
+
+
+@dataclass(frozen=True)
+class SeededContourParameters:
+    """Resolution at which is worked, and the localized contour's forces."""
+
+    resolution_mm: float = parameter(1.6, "Voxels are averaged to about this size, mm.", 0.4, 5.0)
+    energy: str = parameter(
+        "uniform", "Contour energy: uniform modelling or mean separation.", choices=("uniform", "separation")
+    )
+    radius_mm: float = parameter(8.0, "Radius of the ball in which the contour looks at the image, mm.", 2.0, 50.0)
+    curvature: float = parameter(0.5, "Weight of the contour's curvature, in voxels.", 0.0, 10.0)
+    iterations: int = parameter(30, "Iterations of the contour in each slice at most.", 1, 1000)
+
+
+class SeededContour:
+    """Liver from one click."""
+
+    name: ClassVar[str] = "seeded-contour"
+    summary: ClassVar[str] = "Liver from a contrast CT and one click, by localized contours from slice to slice."
+    Parameters: ClassVar[type[SeededContourParameters]] = SeededContourParameters
+
+    def __init__(self, parameters: SeededContourParameters) -> None:
+        self._parameters = parameters
+
+    @classmethod
+    def missing_dependencies(cls) -> tuple[str, ...]:
+        """Nothing beyond Glisson's own dependencies."""
+        return ()
+
+    def segment(
+        self, volume: Volume, labels: LabelMap | None, seeds_mm: FloatArray, progress: Progress = silent
+    ) -> Segmentation:
+        """The liver ({1: "liver"}) with its tumours and vessels, and the slices to look at.
+
+        Args:
+            volume: a CT (HU).
+            labels: not used.
+            seeds_mm: one click or more inside the liver, (n, 3) LPS mm.
+            progress: told how far it is.
+
+        Raises:
+            BadInput: no click, a click outside the scan or in air, fat or bone, or not a CT.
+            StageFailed: nothing like a liver lies about the click.
+        """
+        seeds = _checked_seeds(volume, seeds_mm)
+        grid = WorkingGrid.of(volume.grid, self._parameters.resolution_mm)
+        progress(0.0, "smoothing")
+        clipped = np.clip(volume.voxels, *_VISIBLE_HU)
+        smooth = diffused(grid.working(clipped), grid.spacing_mm, _EDGE_HU, _SMOOTHING_STEPS)
+        clicked = [grid.working_index(index) for index in seeds]
+        _require_soft_tissue(smooth, clicked, seeds_mm)
+        prior = estimate_prior(smooth, grid.spacing_mm, clicked)
+        if prior is None:
+            raise BadInput("There is no soft tissue about the click; click inside the liver.")
+        progress(0.1, "region about the click")
+        region = reachable_region(smooth, prior, grid.spacing_mm, clicked)
+        region = with_surface_tumours(region, smooth, prior, grid.spacing_mm)
+        region = without_gaps(region, smooth, grid.spacing_mm, _GAP_MM)
+        _require_volume(region, grid, seeds_mm)
+        organ, flags = self._contoured(smooth, region, prior, grid, progress)
+        full = ndimage.binary_fill_holes(grid.full(organ))
+        flags += [(border.slice_near(volume.grid), border.sentence) for border in touched_borders(full)]
+        return Segmentation(LabelMap(full.astype(np.uint8), volume.grid, {1: "liver"}), tuple(sorted(flags)))
+
+    def _contoured(
+        self,
+        smooth: NDArray[np.float32],
+        region: NDArray[np.bool_],
+        prior: IntensityPrior,
+        grid: WorkingGrid,
+        progress: Progress,
+    ) -> tuple[NDArray[np.bool_], list[tuple[int, str]]]:
+        """The contours' mask, cleaned in 3-D, and the slices that look wrong (the scan's numbers)."""
+        chosen = self._parameters
+        forces = LocalizedContourParameters(
+            energy=chosen.energy,
+            radius_mm=chosen.radius_mm,
+            curvature=chosen.curvature,
+            iterations=chosen.iterations,
+        )
+        reach = _CONTOUR_RANGE * prior.half_width
+        image = np.clip(smooth, prior.mean - reach, prior.mean + reach)
+        mask, contours = propagate(
+            image, region, grid.spacing_mm, forces, lambda done, message: progress(0.4 + 0.5 * (done or 0.0), message)
+        )
+        progress(0.9, "clean-up")
+        voxel = float(grid.spacing_mm.max())
+        cleaned = opened(without_gaps(mask, smooth, grid.spacing_mm, _GAP_MM), grid.spacing_mm, voxel)
+        flags = flag_slices(contours, cleaned, smooth, prior, grid)
+        return cleaned, flags
+
+
+def _checked_seeds(volume: Volume, seeds_mm: FloatArray) -> FloatArray:
+    """The clicks as fractional voxel indices (n, 3)."""
+    if volume.modality != "CT":
+        raise BadInput("The technique 'seeded-contour' needs a CT, since it knows HU; give the liver's labels instead.")
+    if len(seeds_mm) == 0:
+        raise BadInput(
+            "The technique 'seeded-contour' needs a click inside the liver; give --seed-point X,Y,Z (LPS mm)."
+        )
+    indices = volume.grid.indices_from_points(np.asarray(seeds_mm, dtype=np.float64).reshape(-1, 3))
+    outside = ((indices < -0.5) | (indices > np.array(volume.grid.shape) - 0.5)).any(axis=1)
+    if outside.any():
+        raise BadInput(
+            f"The click {_place(np.asarray(seeds_mm)[outside][0])} lies outside the scan, which {_extent(volume.grid)}."
+        )
+    return indices
+
+
+def _require_soft_tissue(
+    smooth: NDArray[np.float32], clicked: list[tuple[int, int, int]], seeds_mm: FloatArray
+) -> None:
+    kinds = ((-200.0, "air"), (-30.0, "fat"), (250.0, ""), (np.inf, "bone or contrast agent"))
+    for index, seed in zip(clicked, np.asarray(seeds_mm), strict=True):
+        kind = next(name for limit, name in kinds if smooth[index] <= limit)
+        if kind:
+            raise BadInput(f"The click {_place(seed)} lies in {kind} ({smooth[index]:.0f} HU); click inside the liver.")
+
+
+def _require_volume(region: NDArray[np.bool_], grid: WorkingGrid, seeds_mm: FloatArray) -> None:
+    volume_ml = float(region.sum() * np.prod(grid.spacing_mm)) * 1e-3
+    if volume_ml < _SMALLEST_ML:
+        raise StageFailed(
+            f"Only {volume_ml:.1f} ml of like tissue hang together about the click {_place(np.asarray(seeds_mm)[0])}; "
+            "click in a larger, even part of the liver.",
+            Status.STAGNATED,
+        )
+
+
+def _place(point: FloatArray) -> str:
+    return "(" + ", ".join(f"{value:.0f}" for value in point) + ") mm"
+
+
+def _extent(grid: Grid) -> str:
+    corners = grid.points_from_indices(np.array([(0, 0, 0), grid.shape]) - [[0], [1]])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    ranges = ", ".join(f"{axis} {a:.0f} to {b:.0f}" for axis, a, b in zip("xyz", low, high, strict=True))
+    return f"has {ranges} mm (LPS)"
