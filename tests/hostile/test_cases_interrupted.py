@@ -137,7 +137,8 @@ def test_a_disk_that_is_really_full(tmp_path: Path) -> None:
         subprocess.run(["umount", "-l", str(disk)], check=True)
 
 
-def test_a_real_ctrl_c_ends_a_mesh_at_once(tmp_path: Path) -> None:
+@pytest.mark.parametrize("signalled", [signal.SIGINT, signal.SIGTERM])
+def test_a_real_interruption_ends_a_mesh_at_once(tmp_path: Path, signalled: signal.Signals) -> None:
     settings = small_settings().choosing("simulate", "quasi-static", {}).choosing("mesh", None, {"edge_length_mm": 3.0})
     case = make_small_case(tmp_path / "case", settings)
     assert glisson("segment", str(case.folder)).returncode == 0
@@ -150,13 +151,18 @@ def test_a_real_ctrl_c_ends_a_mesh_at_once(tmp_path: Path) -> None:
             break
     time.sleep(1.5)
     interrupted = time.monotonic()
-    os.killpg(running.pid, signal.SIGINT)  # as a terminal does: to the whole group
+    if signalled == signal.SIGINT:
+        os.killpg(running.pid, signalled)  # as a terminal does: to the whole group
+    else:
+        running.send_signal(signalled)
     out, err = running.communicate(timeout=30)
     assert time.monotonic() - interrupted < 10.0
     assert running.returncode == 130
     assert "Interrupted in the stage mesh" in json.loads(out)["message"]
     assert "Traceback" not in err
     assert contents(case.folder) == before
+    with pytest.raises(ProcessLookupError):  # nobody of the group is left
+        os.killpg(running.pid, 0)
 
 
 def test_a_run_that_was_killed_is_no_obstacle(finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,6 +11,8 @@ from glisson.core.parameters import parameter
 from glisson.framework import settings_file
 from glisson.framework.settings import PlaneSettings, SegmentSettings, Settings
 from glisson.framework.settings_file import settings_from_table, settings_text
+from glisson.preoperative.attachments import BoxAttachment, DirectionAttachment
+from glisson.preoperative.manoeuvre import LeverLiftParameters
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,11 @@ def parsed(text: str) -> Settings:
 MANY = replace(
     Settings(seed=7, target="tumour2", materials={"liver": Material("neo-hookean-log", 12.0, 0.3)}),
     segment=SegmentSettings(((1.0, 2.0, 3.0),)),
+    attachments=(
+        DirectionAttachment(directions=("superior",), reach=0.2),
+        BoxAttachment((0.0, -10.0, 5.0), (1.0, 2.0, 30.0), "ligament"),
+    ),
+    scenario=LeverLiftParameters(angle_deg=30.0),
     plane=PlaneSettings(7.5, ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))),
 ).choosing("mesh", "netgen", {"edge_length_mm": 5.0})
 
@@ -79,6 +86,10 @@ def test_another_technique_does_not_inherit_parameters() -> None:
         ("[materials.liver]\npoisson_ratio = 0.5", ["materials.liver", "below 0.5"]),
         ("[materials.liver]\nyoung = 3", ["materials.liver", "young"]),
         ("[materials]\nliver = 3", ["materials.liver", "table"]),
+        ("attachments = 3", ["attachments", "[[attachments]]"]),
+        ("[[attachments]]\nkind = 'ring'", ["attachments", "ring"]),
+        ("[[attachments]]\nreech = 0.2", ["attachments", "reech"]),
+        ("[scenario]\nangle_deg = 90", ["scenario", "angle_deg"]),
         ("seed = -1", ["seed"]),
         ("target = 2", ["target"]),
     ],

@@ -6,11 +6,12 @@ Exit codes: 0 good; 1 a stage failed or did not converge; 2 bad usage or bad inp
 import argparse
 import os
 import re
+import signal
 import sys
 import traceback
 import warnings
 from collections.abc import Sequence
-from contextlib import redirect_stdout
+from contextlib import redirect_stdout, suppress
 from importlib import import_module
 from typing import NoReturn, TextIO
 
@@ -46,6 +47,9 @@ class _Parser(argparse.ArgumentParser):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run `glisson` with these arguments (those of the process by default) and give its exit code."""
     words = _with_negative_values(sys.argv[1:] if arguments is None else arguments)
+    with suppress(ValueError):  # only the main thread may say what signals do
+        # A batch system's end is as orderly as a person's Ctrl-C: nothing half-made, no child left running.
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
     with private_stdout() as stdout:
         answer = _answer(words, stdout)
         tell(answer, "--json" in words, stdout)

@@ -35,7 +35,7 @@ def add_technique_options(parser: argparse.ArgumentParser, sections: Sequence[st
 
     A parameter that several techniques have appears once.
     """
-    listings = [listing for listing in list_techniques() if listing.is_available]
+    listings = [made for made in list_techniques([KINDS[section] for section in sections]) if made.is_available]
     for section in sections:
         named = [listing.name for listing in listings if listing.kind == KINDS[section]]
         group = parser.add_argument_group(f"{section} (kept in case.toml)")

@@ -3,7 +3,7 @@
 It lives in `core` because `mechanics` looks up material laws and must not import `framework`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, is_dataclass
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
@@ -77,9 +77,9 @@ def make_technique(kind: str, name: str, values: Mapping[str, Any], where: str) 
     return made(build_parameters(made.Parameters, values, where))
 
 
-def list_techniques() -> tuple[Listing, ...]:
-    """Every technique of every kind, the broken ones with the reason."""
-    return tuple(_listing(kind, point) for kind in KINDS for point in sorted(_points(kind), key=lambda p: p.name))
+def list_techniques(kinds: Iterable[str] = KINDS) -> tuple[Listing, ...]:
+    """Every technique of some kinds (all by default), the broken ones with the reason."""
+    return tuple(_listing(kind, point) for kind in kinds for point in sorted(_points(kind), key=lambda p: p.name))
 
 
 def _listing(kind: str, point: EntryPoint) -> Listing:

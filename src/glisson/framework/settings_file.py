@@ -4,7 +4,6 @@ from collections.abc import Mapping, MutableMapping, Sequence
 from dataclasses import MISSING, asdict, fields
 from typing import Any
 
-import tomli_w
 import tomlkit
 
 from glisson.core.errors import BadInput
@@ -198,7 +197,7 @@ def _explained(name: str, value: Any, about: Mapping[str, Any], is_set: bool) ->
 def _materials_text(settings: Settings) -> str:
     about = "# Young's modulus above 0, Poisson's ratio below 0.5; laws: glisson techniques.\n"
     tables = [
-        f"[materials.{tomlkit.key(region).as_string()}]\n" + tomli_w.dumps(asdict(material))
+        _table_text(f"[materials.{tomlkit.key(region).as_string()}]", asdict(material))
         for region, material in settings.materials.items()
     ]
     return about + "\n".join(tables)
@@ -209,13 +208,16 @@ def _attachments_text(settings: Settings) -> str:
         "# What holds the organ: surface nodes furthest along some directions (left, right, posterior, anterior,\n"
         '# superior, inferior), or those in a box: kind = "box", low_mm = [x, y, z], high_mm = [x, y, z].\n'
     )
-    tables = [tomli_w.dumps({"attachments": [table]}) for table in _attachment_tables(settings.attachments)]
+    tables = [_table_text("[[attachments]]", table) for table in _attachment_tables(settings.attachments)]
     return about + "\n".join(tables)
 
 
+def _table_text(header: str, values: Mapping[str, Any]) -> str:
+    return "\n".join([header, *(_assignment(name, value) for name, value in values.items())]) + "\n"
+
+
 def _assignment(name: str, value: Any) -> str:
-    # The writer spreads lists over lines; one line can be taken in and out with a single "#".
-    return " ".join(line.strip() for line in tomli_w.dumps({name: value}).splitlines())
+    return f"{name} = {tomlkit.item(_plain(value)).as_string()}"
 
 
 def _plain(value: Any) -> Any:
