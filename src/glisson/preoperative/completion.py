@@ -25,23 +25,23 @@ _SMALLEST_ML = 0.5
 _RIND_MM = 3.0
 """What surrounds a body is looked at so far around it."""
 
-_LIVER_SHARE = 0.42
-"""Share of liver in the soft tissue around a tumour; on phantoms most have 0.45 to 0.9, other organs at most 0.37."""
+_LIVER_SHARE = 0.35
+"""Share of liver in the soft tissue around a tumour; on phantoms most have 0.45 to 0.9, and organs 0.37 at most."""
 
 
-def with_surface_tumours(
+def surface_tumours(
     organ: NDArray[np.bool_], smooth: NDArray[np.float32], prior: IntensityPrior, spacing_mm: FloatArray
 ) -> NDArray[np.bool_]:
-    """The organ's mask (a, b, c) together with the dark bodies that it encloses in good part."""
+    """The dark bodies beside the organ's mask (a, b, c) that it encloses in good part, same shape."""
     dark = (smooth > max(prior.mean - _DARKEST, _DARKEST_HU)) & (smooth < prior.mean - 0.5 * prior.half_width)
     dark &= ~organ
+    found = np.zeros(organ.shape, dtype=bool)
     cores, count = ndimage.label(ndimage.distance_transform_edt(dark, sampling=spacing_mm) > _THINNEST_MM)
     if count == 0:
-        return organ
+        return found
     distance, nearest = ndimage.distance_transform_edt(cores == 0, sampling=spacing_mm, return_indices=True)
     bodies = cores[tuple(nearest)] * (dark & (distance < _THINNEST_MM + 1.0))
     soft = (smooth > 0.0) & (smooth < 250.0)
-    completed: NDArray[np.bool_] = organ.copy()
     margin = np.ceil((_RIND_MM + 0.5) / spacing_mm).astype(int)
     for number, box in enumerate(ndimage.find_objects(bodies), start=1):
         if box is None:
@@ -53,8 +53,8 @@ def with_surface_tumours(
         rind = (ndimage.distance_transform_edt(~body, sampling=spacing_mm) <= _RIND_MM) & ~body
         liver = int((rind & organ[wide]).sum())
         if liver > _LIVER_SHARE * int((rind & (organ[wide] | soft[wide])).sum()):
-            completed[wide] |= body
-    return completed
+            found[wide] |= body
+    return found
 
 
 def without_gaps(

@@ -9,20 +9,22 @@ the narrower the passage and the larger the difference, the less so.
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
-from skimage.morphology import h_maxima
 from skimage.segmentation import watershed
 
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.preoperative.intensity_prior import SOFT_TISSUE_HU, IntensityPrior
 
-_NARROWEST_PASSAGE = 0.45
+_NARROWEST_PASSAGE = 0.3
 """Basins of equal grey value are joined when the passage is this fraction as wide as the smaller basin …"""
 
-_PASSAGE_PER_HU = 0.06
+_PASSAGE_PER_HU = 0.08
 """ … and by this much more for each HU between them."""
 
 _VESSEL_AREA_MM2 = 250.0
 """Gaps of the band that are surrounded in a plane and smaller than this are vessels or small tumours."""
+
+_LEAST_APART_MM = 8.0
+"""Two basins have their deepest points at least about half of this apart."""
 
 _DETAIL_MM = 6.0
 """Radius below which what hangs on the organ is taken for something else (opening)."""
@@ -43,7 +45,9 @@ def reachable_region(
     filled = _without_vessel_gaps(band, spacing_mm) & (smooth > SOFT_TISSUE_HU[0])
     distance = ndimage.distance_transform_edt(filled, sampling=spacing_mm)
     width = ndimage.gaussian_filter(distance.astype(np.float32), 1.5 / spacing_mm) * filled
-    markers, count = ndimage.label(h_maxima(width, 0.7))  # type: ignore[no-untyped-call]
+    # Flat tops and ripples give more basins than needed; their wide passages join them again below.
+    size = np.maximum(np.rint(_LEAST_APART_MM / spacing_mm), 3).astype(int)
+    markers, count = ndimage.label((width == ndimage.maximum_filter(width, size=tuple(size))) & (width > 0.0))
     if count == 0:
         return np.zeros(band.shape, dtype=bool)
     basins = watershed(-width, markers, mask=filled).astype(np.int64)  # type: ignore[no-untyped-call]

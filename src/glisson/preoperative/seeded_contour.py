@@ -19,7 +19,7 @@ from glisson.core.parameters import parameter
 from glisson.core.protocols import Progress, Segmentation, silent
 from glisson.core.status import Status
 from glisson.preoperative.borders import touched_borders
-from glisson.preoperative.completion import with_surface_tumours, without_gaps
+from glisson.preoperative.completion import surface_tumours, without_gaps
 from glisson.preoperative.diffusion import diffused
 from glisson.preoperative.intensity_prior import IntensityPrior, estimate_prior
 from glisson.preoperative.localized_contour import LocalizedContourParameters
@@ -37,6 +37,7 @@ _CONTOUR_RANGE = 3.0
 _EDGE_HU = 20.0
 _SMOOTHING_STEPS = 6
 _GAP_MM = 4.0
+_TUMOUR_ROUNDS = 2
 _SMALLEST_ML = 5.0
 
 
@@ -94,8 +95,7 @@ class SeededContour:
         if prior is None:
             raise BadInput("There is no soft tissue about the click; click inside the liver.")
         progress(0.1, "region about the click")
-        region = reachable_region(smooth, prior, grid.spacing_mm, clicked)
-        region = with_surface_tumours(region, smooth, prior, grid.spacing_mm)
+        region = _region_with_tumours(smooth, prior, grid.spacing_mm, clicked)
         region = without_gaps(region, smooth, grid.spacing_mm, _GAP_MM)
         _require_volume(region, grid, seeds_mm)
         organ, flags = self._contoured(smooth, region, prior, grid, progress)
@@ -129,6 +129,22 @@ class SeededContour:
         cleaned = opened(without_gaps(mask, smooth, grid.spacing_mm, _GAP_MM), grid.spacing_mm, voxel)
         flags = flag_slices(contours, cleaned, smooth, prior, grid)
         return cleaned, flags
+
+
+def _region_with_tumours(
+    smooth: NDArray[np.float32], prior: IntensityPrior, spacing_mm: FloatArray, clicked: list[tuple[int, int, int]]
+) -> NDArray[np.bool_]:
+    """The reachable region with surface tumours; a tumour may hide liver that lies behind it."""
+    region = reachable_region(smooth, prior, spacing_mm, clicked)
+    tumours = np.zeros_like(region)
+    for _ in range(_TUMOUR_ROUNDS):
+        found = surface_tumours(region, smooth, prior, spacing_mm)
+        if not found.any():
+            break
+        tumours |= found
+        healed = np.where(tumours, np.float32(prior.mean), smooth)
+        region = reachable_region(healed, prior, spacing_mm, clicked) | tumours
+    return region
 
 
 def _checked_seeds(volume: Volume, seeds_mm: FloatArray) -> FloatArray:
