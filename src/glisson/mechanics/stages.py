@@ -10,7 +10,7 @@ from glisson.core.arrays import FloatArray
 from glisson.core.deformation import Deformation, Event, LoadStep, StageResult
 from glisson.core.model import Model
 from glisson.core.protocols import Progress
-from glisson.core.scenario import Scenario, Stage
+from glisson.core.scenario import ContactLaw, Scenario, Stage
 from glisson.core.status import Status
 from glisson.core.units import STANDARD_GRAVITY_MM_S2, density_from_kg_m3, millinewtons_from_newtons
 from glisson.mechanics.body import Body
@@ -30,10 +30,11 @@ _LARGEST_ANGLE = radians(90.0)
 
 @dataclass(frozen=True, eq=False)
 class _Target:
-    """Tool angles (rad) and dead loads (n, 3) at the end of a ramp."""
+    """Tool angles (rad), dead loads (n, 3) and contact law at the end of a ramp."""
 
     angles: tuple[float, ...]
     external: FloatArray
+    law: ContactLaw
 
 
 class StageRunner:
@@ -69,14 +70,20 @@ class StageRunner:
     def _run_stage(self, stage: Stage) -> NewtonEnd:
         body = self._body
         body.hold(fixed_unknowns(self._model, stage.fixed))
-        body.law = stage.contact
+        if self._number == 0:
+            body.law = stage.contact
         gravity = self._scenario.surgery_gravity if stage.gravity else None
         external = gravity_forces(self._model, gravity)
         angles = [contact.angle for contact in body.contacts]
         for drive in stage.drives:
             if drive.angle_deg is not None:
                 angles[self._contact_number(drive.lever)] = radians(drive.angle_deg)
-        end = self._ramp(stage, _Target(tuple(angles), external))
+        if body.law != stage.contact and stage.drives:
+            # The law changes while the tools stand still, and only then do they move.
+            end = self._ramp(stage, _Target(tuple(c.angle for c in body.contacts), body.external, stage.contact))
+            if end.status is not Status.CONVERGED:
+                return end
+        end = self._ramp(stage, _Target(tuple(angles), external, stage.contact))
         for drive in stage.drives:
             if drive.force_n is not None and end.status is Status.CONVERGED:
                 end = self._lift_by_force(stage, drive.lever, millinewtons_from_newtons(drive.force_n))
@@ -85,7 +92,7 @@ class StageRunner:
     def _ramp(self, stage: Stage, target: _Target) -> NewtonEnd:
         """Go to the target, halving the load step where it fails and doubling it where it is easy."""
         body = self._body
-        start = _Target(tuple(contact.angle for contact in body.contacts), body.external.copy())
+        start = _Target(tuple(contact.angle for contact in body.contacts), body.external.copy(), body.law)
         turn = max((abs(b - a) for a, b in zip(start.angles, target.angles, strict=True)), default=0.0)
         steps = max(int(np.ceil(turn / self._step - 1e-9)), 1)
         if np.linalg.norm(target.external - start.external) > 1e-9 * np.linalg.norm(target.external):
@@ -110,11 +117,11 @@ class StageRunner:
         """Equilibrium at the goal; tools, loads and anchors are put back where it is not reached."""
         body = self._body
         memories = [contact.memory() for contact in body.contacts]
-        external = body.external
+        external, law = body.external, body.law
         moved = self._positions + self._newton.predict(self._positions, goal.angles, goal.external)
         for contact, angle in zip(body.contacts, goal.angles, strict=True):
             contact.angle = angle
-        body.external = goal.external
+        body.external, body.law = goal.external, goal.law
         if np.isfinite(body.elasticity.energy(moved)):
             end = self._without_penetration(self._newton.solve(moved))
         else:
@@ -122,7 +129,7 @@ class StageRunner:
         if end.status is not Status.CONVERGED:
             for contact, memory in zip(body.contacts, memories, strict=True):
                 contact.recall(memory)
-            body.external = external
+            body.external, body.law = external, law
         return end
 
     def _without_penetration(self, end: NewtonEnd) -> NewtonEnd:
@@ -176,7 +183,7 @@ class StageRunner:
             goal = [c.angle for c in body.contacts]
             goal[number] = angle + turn
             before, memories = self._positions, [c.memory() for c in body.contacts]
-            end = self._load_step(_Target(tuple(goal), body.external))
+            end = self._load_step(_Target(tuple(goal), body.external, body.law))
             if end.status is Status.CONVERGED:
                 reached = wanted - self._moment(number, end.positions)
                 if reached >= -_FORCE_ACCURACY * wanted:
@@ -255,7 +262,11 @@ def fixed_unknowns(model: Model, names: tuple[str, ...]) -> NDArray[np.bool_]:
 
 def _between(start: _Target, goal: _Target, share: float) -> _Target:
     angles = tuple(a + share * (b - a) for a, b in zip(start.angles, goal.angles, strict=True))
-    return _Target(angles, start.external + share * (goal.external - start.external))
+    law = ContactLaw(
+        start.law.friction + share * (goal.law.friction - start.law.friction),
+        start.law.cohesion_kpa + share * (goal.law.cohesion_kpa - start.law.cohesion_kpa),
+    )
+    return _Target(angles, start.external + share * (goal.external - start.external), law)
 
 
 def _sentence(stage: Stage, end: NewtonEnd) -> str:
