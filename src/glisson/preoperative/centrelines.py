@@ -2,8 +2,9 @@
 
 The mask is thinned to one voxel (Lee, Kashyap and Chu 1994, in scikit-image), its voxels become a graph,
 loops are cut where they cost most (minimum spanning tree), and spurs no longer than the tube is wide are
-pruned. The radius at a point is that of the circle with the tube's local cross-section, its volume over
-its length; the distance to the nearest voxel outside, which guides the pruning, is up to a voxel too small.
+pruned. Thinning is up to a voxel off the middle and the distance to the nearest voxel outside, which guides
+the pruning, up to a voxel too small: so each point is moved to the centroid of the tube's voxels about it,
+and its radius is that of the circle with the tube's local cross-section, its volume over its length.
 """
 
 from collections.abc import Sequence
@@ -61,7 +62,7 @@ def centreline_trees(mask: NDArray[np.bool_], grid: Grid, smallest_mm: float = 0
         if len(members) >= 2:
             tree = _pruned(_rooted(points[members], radii[members], csr_array(graph[members][:, members])))
             trees.append(_smoothed(tree))
-    trees = _with_section_radii(trees, mask, grid)
+    trees = _centred(trees, mask, grid)
     kept = [tree for tree in trees if len(tree.points_mm) >= 2 and tree.length_mm >= smallest_mm]
     return tuple(sorted(kept, key=lambda tree: -tree.length_mm))
 
@@ -177,11 +178,11 @@ def _mixing(tree: Tree) -> csr_array:
     return csr_array(0.5 * (eye_array(count) + share @ both))
 
 
-def _with_section_radii(trees: Sequence[Tree], mask: NDArray[np.bool_], grid: Grid) -> list[Tree]:
-    """The trees with radii from the cross-section of the mask around each point.
+def _centred(trees: Sequence[Tree], mask: NDArray[np.bool_], grid: Grid) -> list[Tree]:
+    """The trees in the middle of the mask, with radii from its cross-section around each point.
 
-    Each voxel belongs to the nearest point; volume and length are evened out along the tree before they
-    are divided. Voxels beyond an end of the line are left out, since no length belongs to them.
+    Each voxel belongs to the nearest point; volume, length and offset are evened out along the tree before
+    they are divided. Voxels beyond an end of the line are left out, since no length belongs to them.
     """
     if not trees:
         return []
@@ -189,30 +190,35 @@ def _with_section_radii(trees: Sequence[Tree], mask: NDArray[np.bool_], grid: Gr
     points = np.concatenate([tree.points_mm for tree in trees])
     outward = np.concatenate([_outward_at_ends(tree) for tree in trees])
     _, nearest = cKDTree(points).query(voxels)
-    beside = np.einsum("ij,ij->i", voxels - points[nearest], outward[nearest]) <= 0.0
-    counts = np.bincount(nearest[beside], minlength=len(points)).astype(np.float64)
-    volumes = counts * grid.voxel_volume_mm3
+    away = voxels - points[nearest]
+    beyond = np.einsum("ij,ij->i", away, outward[nearest])
+    beside, away = nearest[beyond <= 0.0], (away - beyond[:, None] * outward[nearest])[beyond <= 0.0]
+    counts = np.bincount(beside, minlength=len(points)).astype(np.float64)
+    offsets = np.zeros_like(points)
+    np.add.at(offsets, beside, away)
     made, start = [], 0
     for tree in trees:
         own = slice(start, start + len(tree.points_mm))
         start = own.stop
-        mixing, volume, length = _mixing(tree), volumes[own], _own_lengths(tree)
+        mixing, count, length, offset = _mixing(tree), counts[own], _own_lengths(tree), offsets[own]
         for _ in range(6):
-            volume, length = mixing.T @ volume, mixing.T @ length
-        radii = np.sqrt(volume / (np.pi * np.maximum(length, 1e-9)))
-        made.append(Tree(tree.points_mm, np.maximum(radii, 0.5 * float(grid.spacing_mm.min())), tree.parents))
+            count, length, offset = mixing.T @ count, mixing.T @ length, mixing.T @ offset
+        area = count * grid.voxel_volume_mm3 / np.maximum(length, 1e-9)
+        radii = np.maximum(np.sqrt(area / np.pi), 0.5 * float(grid.spacing_mm.min()))
+        made.append(Tree(tree.points_mm + offset / np.maximum(count, 1e-9)[:, None], radii, tree.parents))
     return made
 
 
 def _outward_at_ends(tree: Tree) -> FloatArray:
-    """Direction in which the tube goes on beyond each end of the tree; zero at inner points, (n, 3)."""
+    """Unit direction in which the tube goes on beyond each end of the tree; zero at inner points, (n, 3)."""
     outward = np.zeros_like(tree.points_mm)
     parent, child = tree.edges.T
     degree = np.bincount(tree.edges.ravel(), minlength=len(outward))
     for end, inner in ((child, parent), (parent, child)):
         is_end = degree[end] == 1
         outward[end[is_end]] = tree.points_mm[end[is_end]] - tree.points_mm[inner[is_end]]
-    return outward
+    lengths = np.linalg.norm(outward, axis=1, keepdims=True)
+    return outward / np.where(lengths > 0.0, lengths, 1.0)
 
 
 def _own_lengths(tree: Tree) -> FloatArray:

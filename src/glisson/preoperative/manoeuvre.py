@@ -89,7 +89,7 @@ def place_lever(mesh: TetMesh, parameters: LeverLiftParameters) -> Lever:
     centres = mesh.nodes[mesh.corners].mean(axis=1)
     volumes = mesh.corner_volumes_mm3
     medial_limit = _quantile(centres[:, 0], volumes, 1.0 - parameters.lobe_fraction)
-    lobe = centres[:, 0] > medial_limit
+    lobe = centres[:, 0] >= medial_limit
     middle = _quantile(centres[lobe, 2], volumes[lobe], 0.6)
     underside = _underside(mesh, middle, parameters.width_mm + 2.0 * _SAMPLE_MM)
     tip = float(underside[:, 0].max()) if len(underside) else medial_limit

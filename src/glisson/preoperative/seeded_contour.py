@@ -76,15 +76,17 @@ class SeededContour:
 
         Args:
             volume: a CT (HU).
-            labels: not used.
+            labels: tumours that are known already ("tumour1" and so on); they belong to the liver.
             seeds_mm: one click or more inside the liver, (n, 3) LPS mm.
             progress: told how far it is.
 
         Raises:
-            BadInput: no click, a click outside the scan or in air, fat or bone, or not a CT.
+            BadInput: no click, a click outside the scan or in air, fat or bone, labels on another grid, or
+                not a CT.
             StageFailed: nothing like a liver lies about the click.
         """
         seeds = _checked_seeds(volume, seeds_mm)
+        known = _known_tumours(volume, labels)
         grid = WorkingGrid.of(volume.grid, self._parameters.resolution_mm)
         progress(0.0, "smoothing")
         clipped = np.clip(volume.voxels, *_VISIBLE_HU)
@@ -95,11 +97,11 @@ class SeededContour:
         if prior is None:
             raise BadInput("There is no soft tissue about the click; click inside the liver.")
         progress(0.1, "region about the click")
-        region = _region_with_tumours(smooth, prior, grid.spacing_mm, clicked)
+        region = _region_with_tumours(smooth, prior, grid.spacing_mm, clicked, grid.working(known) >= 0.5)
         region = without_gaps(region, smooth, grid.spacing_mm, _GAP_MM)
         _require_volume(region, grid, seeds_mm)
         organ, flags = self._contoured(smooth, region, prior, grid, progress)
-        full = ndimage.binary_fill_holes(grid.full(organ))
+        full = ndimage.binary_fill_holes(grid.full(organ) | known)
         flags += [(border.slice_near(volume.grid), border.sentence) for border in touched_borders(full)]
         return Segmentation(LabelMap(full.astype(np.uint8), volume.grid, {1: "liver"}), tuple(sorted(flags)))
 
@@ -131,20 +133,45 @@ class SeededContour:
         return cleaned, flags
 
 
+def _known_tumours(volume: Volume, labels: LabelMap | None) -> NDArray[np.bool_]:
+    """Voxels [i, j, k] of the tumours that are labelled already."""
+    names = [] if labels is None else [name for name in labels.names.values() if name.startswith("tumour")]
+    if labels is None or not names:
+        return np.zeros(volume.grid.shape, dtype=bool)
+    if not volume.grid.matches(labels.grid):
+        raise BadInput("The label map of the tumours lies on another grid than the scan; resample it onto the scan's.")
+    return labels.mask(*names)
+
+
 def _region_with_tumours(
-    smooth: NDArray[np.float32], prior: IntensityPrior, spacing_mm: FloatArray, clicked: list[tuple[int, int, int]]
+    smooth: NDArray[np.float32],
+    prior: IntensityPrior,
+    spacing_mm: FloatArray,
+    clicked: list[tuple[int, int, int]],
+    known: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
-    """The reachable region with surface tumours; a tumour may hide liver that lies behind it."""
-    region = reachable_region(smooth, prior, spacing_mm, clicked)
-    tumours = np.zeros_like(region)
+    """The reachable region with known and surface tumours; a tumour may hide liver that lies behind it."""
+    tumours = known
+    region = _reachable_with(tumours, smooth, prior, spacing_mm, clicked)
     for _ in range(_TUMOUR_ROUNDS):
         found = surface_tumours(region, smooth, prior, spacing_mm)
         if not found.any():
             break
-        tumours |= found
-        healed = np.where(tumours, np.float32(prior.mean), smooth)
-        region = reachable_region(healed, prior, spacing_mm, clicked) | tumours
+        tumours = tumours | found
+        region = _reachable_with(tumours, smooth, prior, spacing_mm, clicked)
     return region
+
+
+def _reachable_with(
+    tumours: NDArray[np.bool_],
+    smooth: NDArray[np.float32],
+    prior: IntensityPrior,
+    spacing_mm: FloatArray,
+    clicked: list[tuple[int, int, int]],
+) -> NDArray[np.bool_]:
+    healed = np.where(tumours, np.float32(prior.mean), smooth)
+    reached = reachable_region(healed, prior, spacing_mm, clicked)
+    return reached | tumours if reached.any() else reached
 
 
 def _checked_seeds(volume: Volume, seeds_mm: FloatArray) -> FloatArray:

@@ -110,9 +110,11 @@ def _decimated(vertices: FloatArray, triangles: IntArray, edge_length_mm: float)
 
 def _with_volume(vertices: FloatArray, triangles: IntArray, volume_mm3: float) -> FloatArray:
     """Vertices moved equally along their normals until the surface encloses the volume."""
-    for _ in range(3):
+    for _ in range(20):  # Newton's steps: three for an organ, more where the shift is not small to the body
         surface = TriangleSurface(vertices, triangles)
         missing = volume_mm3 - surface.volume_mm3
+        if abs(missing) < 1e-9 * volume_mm3:
+            break
         normals = _vertex_normals(vertices, triangles)
         vertices = vertices + missing / float(surface.triangle_areas_mm2.sum()) * normals
     return vertices
