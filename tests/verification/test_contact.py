@@ -38,7 +38,7 @@ def test_distance_to_the_lever() -> None:
     """Against the rounded box by brute force: sampled points of the inner box, grown by the radius."""
     lever = Lever.lifting("lever", np.zeros(3), np.array([1.0, 0, 0]), np.array([0, -1.0, 0]), length_mm=60.0)
     tool = LeverTool(lever)
-    rotation, translation = tool.pose(radians(20.0))
+    rotation, _ = tool.pose(radians(20.0))
     np.testing.assert_allclose(rotation @ [1, 0, 0], [cos(radians(20)), -sin(radians(20)), 0], atol=1e-12)
     rng = np.random.default_rng(0)
     points = rng.uniform([-20, -20, -20], [80, 20, 20], (200, 3))
