@@ -28,6 +28,9 @@ _RIND_MM = 3.0
 _LIVER_SHARE = 0.35
 """Share of liver in the soft tissue around a tumour; on phantoms most have 0.45 to 0.9, and organs 0.37 at most."""
 
+_ENCLOSED_SHARE = 0.25
+"""Share of liver in all that surrounds a tumour, fat and air included; an organ lying in fat beside it has less."""
+
 
 def surface_tumours(
     organ: NDArray[np.bool_], smooth: NDArray[np.float32], prior: IntensityPrior, spacing_mm: FloatArray
@@ -52,7 +55,8 @@ def surface_tumours(
             continue
         rind = (ndimage.distance_transform_edt(~body, sampling=spacing_mm) <= _RIND_MM) & ~body
         liver = int((rind & organ[wide]).sum())
-        if liver > _LIVER_SHARE * int((rind & (organ[wide] | soft[wide])).sum()):
+        in_soft_tissue = liver / max(int((rind & (organ[wide] | soft[wide])).sum()), 1)
+        if in_soft_tissue > _LIVER_SHARE and liver > _ENCLOSED_SHARE * int(rind.sum()):
             found[wide] |= body
     return found
 
