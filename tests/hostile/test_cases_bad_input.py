@@ -12,7 +12,7 @@ import pytest
 from dicom_samples import stored_values, write_series
 from glisson.cli.main import main
 from glisson.core.image import Grid, LabelMap
-from glisson.framework.case import ORGAN, SCAN, SETTINGS
+from glisson.framework.case import ORGAN, SCAN, SCENARIO, SETTINGS
 from glisson.io.images import write_labels, write_volume
 from small_case import GRID, contents, images, make_small_case, offer_bending, small_settings
 
@@ -137,6 +137,20 @@ def test_a_material_out_of_range(meshed: Path, refused: Refused, line: str, word
     message = refused(meshed, 2, "run", meshed)
     assert words in message
     assert "jelly" in message or "materials.liver" in message
+
+
+def test_a_lever_that_does_not_touch(meshed: Path, refused: Refused) -> None:
+    """With the real solver: the bar lies 200 mm below the liver and is lifted by 5°."""
+    text = (meshed / SETTINGS).read_text()
+    (meshed / SETTINGS).write_text(text.replace('technique = "bending"', 'technique = "quasi-static"\nelement = "T4"'))
+    lines = (meshed / SCENARIO).read_text().replace("from-gravity", "as-scanned").splitlines()
+    at = next(number for number, line in enumerate(lines) if line.startswith("hinge_mm"))
+    lines[at + 2] = "    200.0,"
+    text = "\n".join(lines).replace("angle_deg = 22.0", "angle_deg = 5.0")
+    (meshed / SCENARIO).write_text(text)
+    message = refused(meshed, 2, "run", meshed)
+    assert "never touched" in message
+    assert "'lever'" in message
 
 
 @pytest.mark.parametrize(

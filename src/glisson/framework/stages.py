@@ -13,6 +13,7 @@ from glisson.core.errors import BadInput, StageFailed
 from glisson.core.image import LabelMap
 from glisson.core.mesh import TetMesh, TriangleSurface
 from glisson.core.protocols import Progress, Segmentation, silent
+from glisson.core.status import Status
 from glisson.framework.case import (
     GUIDANCE,
     MODEL,
@@ -194,6 +195,8 @@ class SimulateStage(Stage):
         solver = settings.choices["simulate"].make(SETTINGS, settings.seed)
         model, scenario = read_model(case.path(MODEL)), read_scenario(case.path(SCENARIO))
         deformation: Deformation = solver.solve(model, scenario, progress)
+        if deformation.status is Status.BAD_INPUT:
+            raise BadInput(deformation.message)
         if not deformation.status.is_good:
             raise StageFailed(deformation.message or deformation.status.sentence, deformation.status)
         write_deformation(out / RESULTS, deformation)
