@@ -179,11 +179,11 @@ def test_doctor_says_what_is_missing(glisson: Glisson, monkeypatch: pytest.Monke
     from glisson.framework import checkup
 
     real = checkup.package_version
-    monkeypatch.setattr(checkup, "package_version", lambda name: None if name == "ipctk" else real(name))
+    monkeypatch.setattr(checkup, "package_version", lambda name: None if name == "embreex" else real(name))
     monkeypatch.setattr(checkup, "_column_under_its_weight", lambda: "not now")
     code, said = glisson("doctor")
     assert code == 1
-    finding = next(finding for finding in said["findings"] if finding["name"] == "ipctk")
+    finding = next(finding for finding in said["findings"] if finding["name"] == "embreex")
     assert "install" in finding["detail"]
 
 

@@ -23,11 +23,12 @@ from glisson.core.status import Status
 from glisson.mechanics.body import scatter_blocks
 from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.elements import SurfaceQuadrature, quadrature
-from glisson.mechanics.linear_solvers import make_factorisation
+from glisson.mechanics.linear_solvers import Factorisation, make_factorisation
 from glisson.mechanics.pattern import FreeSystem, block_pattern, pair_slots
 
 _TOLERANCE = 1e-8
 _ITERATION_LIMIT = 60
+_WEIGHT_SHARES = (0.25, 0.5, 0.75, 1.0)
 _BED_STIFFNESS_SHARE = 10.0  # bed stiffness in Young's moduli per mm: a weight of 0.6 kPa sinks in by 0.01 mm
 _FACING = -0.5  # a surface point lies on a board when its outward normal is turned this much towards it
 
@@ -100,31 +101,40 @@ class _InverseProblem:
         self._pattern = block_pattern(mesh.tetrahedra, len(mesh.nodes))
         self._system = FreeSystem(self._pattern, fixed.ravel())
         self._pairs = pair_slots(self._pattern, surface.nodes)
+        self._share = 1.0
 
     def solve(self) -> FloatArray:
-        """X by a quasi-Newton iteration with backtracking on the residual."""
+        """X by a quasi-Newton iteration with backtracking on the residual, the weight brought on in steps."""
         positions = np.array(self._mesh.nodes)
         factorisation = make_factorisation()
-        force = self._unbalanced(positions)
-        reference = float(np.linalg.norm(self._weights))
         try:
-            for _ in range(_ITERATION_LIMIT):
-                size = float(np.linalg.norm(force))
-                if size <= _TOLERANCE * reference:
-                    return positions
-                if not factorisation.factor(self._stiffness(positions)):
-                    break
-                step = np.zeros(force.size)
-                step[self._system.free] = factorisation.solve(-force.ravel()[self._system.free])
-                found = self._search(positions, step.reshape(force.shape), size)
-                if found is None:
-                    break
-                positions, force = found
+            for share in _WEIGHT_SHARES:
+                self._share = share
+                positions = self._balanced(positions, factorisation)
         finally:
             factorisation.close()
+        return positions
+
+    def _balanced(self, positions: FloatArray, factorisation: Factorisation) -> FloatArray:
+        """X for the present share of the weight, started from another share's."""
+        force = self._unbalanced(positions)
+        reference = self._share * float(np.linalg.norm(self._weights))
+        for _ in range(_ITERATION_LIMIT):
+            size = float(np.linalg.norm(force))
+            if size <= _TOLERANCE * reference:
+                return positions
+            if not factorisation.factor(self._stiffness(positions)):
+                break
+            step = np.zeros(force.size)
+            step[self._system.free] = factorisation.solve(-force.ravel()[self._system.free])
+            found = self._search(positions, step.reshape(force.shape), size)
+            if found is None:
+                break
+            positions, force = found
         raise StageFailed(
-            "No unloaded shape could be found: the organ is too soft to carry its weight in the scanned shape; "
-            'use a higher Young\'s modulus, more attachments, or rest_shape = "as-scanned".',
+            f"No unloaded shape could be found (at {100 * self._share:.0f} % of the weight): the organ is too soft to "
+            "carry its weight in the scanned shape; use a higher Young's modulus, more attachments, or "
+            'rest_shape = "as-scanned".',
             Status.STAGNATED,
         )
 
@@ -140,7 +150,7 @@ class _InverseProblem:
 
     def _unbalanced(self, positions: FloatArray) -> FloatArray:
         elasticity = Elasticity(self._mesh, self._materials, positions)
-        force = self._weights - elasticity.forces(self._mesh.nodes)
+        force = self._share * self._weights - elasticity.forces(self._mesh.nodes)
         pushes = np.zeros((len(self._surface.areas), 3))
         for bed in self._beds:
             forces = self.pressures(bed, positions) * self._surface.areas[bed.points]
