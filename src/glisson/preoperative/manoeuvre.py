@@ -61,7 +61,9 @@ def propose_scenario(model: Model, parameters: LeverLiftParameters | None = None
     """
     chosen = LeverLiftParameters() if parameters is None else parameters
     model.node_set("back")
-    board = Board("board", np.array([0.0, _board_height(model.mesh, chosen.board_depth_mm), 0.0]), -DOWN)
+    board = Board(
+        "board", np.array([0.0, _board_height(model.mesh, chosen.board_depth_mm), 0.0]), -DOWN, conforming=True
+    )
     lift = LeverDrive("lever", angle_deg=chosen.angle_deg)
     return Scenario(
         tools=(board, place_lever(model.mesh, chosen)),
