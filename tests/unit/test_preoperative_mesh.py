@@ -56,6 +56,9 @@ def test_parts_that_share_an_edge_only_are_two():
     count, part = face_connected_parts(tetrahedra)
     assert count == 2
     assert part[0] == part[2] != part[1]
+    nodes = [[0, 0, 0], [0, 0, 1], [1, 0, 0], [0.5, 1, 0.5], [-1, 0, 0], [-0.5, -1, 0.5], [0.5, 0.3, 2]]
+    made = TetMesh(nodes, [[0, 1, 2, 3], [0, 1, 4, 5]])
+    assert mesh_quality(made).pinched_edges == 1
 
 
 WAITING = """

@@ -204,7 +204,8 @@ def _centred(trees: Sequence[Tree], mask: NDArray[np.bool_], grid: Grid) -> list
         for _ in range(6):
             count, length, offset = mixing.T @ count, mixing.T @ length, mixing.T @ offset
         area = count * grid.voxel_volume_mm3 / np.maximum(length, 1e-9)
-        radii = np.maximum(np.sqrt(area / np.pi), 0.5 * float(grid.spacing_mm.min()))
+        # Where branches share a wide place, each has a part of its section only, but the ball inside stays.
+        radii = np.maximum(np.sqrt(area / np.pi), tree.radii_mm)
         made.append(Tree(tree.points_mm + offset / np.maximum(count, 1e-9)[:, None], radii, tree.parents))
     return made
 

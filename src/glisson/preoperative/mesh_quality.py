@@ -15,7 +15,8 @@ class MeshQuality:
     """Figures of a mesh by its straight corners: angles in degrees, lengths in mm, volume in ml.
 
     `smallest_dihedral_deg` is the worst angle of the mesh, `median_dihedral_deg` the median over the
-    elements of each one's smallest (70.5° for a regular tetrahedron).
+    elements of each one's smallest (70.5° for a regular tetrahedron). At `pinched_edges` the mesh touches
+    itself: more than two triangles of its boundary meet there, as at the bottom of a tight fissure.
     """
 
     elements: int
@@ -27,6 +28,7 @@ class MeshQuality:
     median_edge_mm: float
     longest_edge_mm: float
     smallest_volume_mm3: float
+    pinched_edges: int
 
 
 def mesh_quality(mesh: TetMesh) -> MeshQuality:
@@ -44,7 +46,15 @@ def mesh_quality(mesh: TetMesh) -> MeshQuality:
         median_edge_mm=float(np.median(lengths)),
         longest_edge_mm=float(lengths.max()),
         smallest_volume_mm3=float(mesh.corner_volumes_mm3.min()),
+        pinched_edges=_pinched_edges(mesh),
     )
+
+
+def _pinched_edges(mesh: TetMesh) -> int:
+    triangles, _ = mesh.boundary()
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    _, counts = np.unique(edges, axis=0, return_counts=True)
+    return int((counts > 2).sum())
 
 
 def smallest_dihedral_angles_deg(nodes: FloatArray, corners: IntArray) -> FloatArray:

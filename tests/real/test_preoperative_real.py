@@ -1,0 +1,100 @@
+"""Model from the masks of a real CT (3D-IRCADb-01, case 17); labels and one click on TotalSegmentator's CT."""
+
+import tarfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from glisson.core import LabelMap
+from glisson.geometry.distance import closest_points
+from glisson.io.dicom import read_dicom_mask
+from glisson.io.images import read_labels, read_volume
+from glisson.preoperative.ftetwild import FTetWild, FTetWildParameters
+from glisson.preoperative.label_segmenter import LabelSegmenter, LabelSegmenterParameters
+from glisson.preoperative.model_building import ModelSettings, build_model
+from glisson.preoperative.seeded_contour import SeededContour, SeededContourParameters
+from glisson.preoperative.surface import MarchingCubes, MarchingCubesParameters
+from preoperative_shapes import dice
+
+pytestmark = pytest.mark.real
+
+
+@pytest.fixture(scope="module")
+def masks(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, LabelMap]:
+    folder = tmp_path_factory.mktemp("ircad-masks")
+    with tarfile.open(shared_data / "research-only" / "ircadb01-case17" / "MASKS_DICOM.tar.xz") as archive:
+        archive.extractall(folder, filter="data")
+    found = {}
+    for name in ("liver", "livertumor1", "livertumor2", "portalvein"):
+        image = read_dicom_mask(folder / "MASKS_DICOM" / name)
+        found[name] = LabelMap((np.asarray(image.voxels) > 0).astype(np.uint8), image.grid, {1: name})
+    return found
+
+
+def border_faces(mask: np.ndarray, labels: LabelMap) -> np.ndarray:
+    """Centres (n, 3) mm of the voxel faces between inside and outside."""
+    centres = []
+    for axis in range(3):
+        changes = np.argwhere(np.diff(mask, axis=axis)).astype(float)
+        changes[:, axis] += 0.5
+        centres.append(labels.grid.points_from_indices(changes))
+    return np.concatenate(centres)
+
+
+def test_model_from_masks(masks: dict[str, LabelMap], capsys: pytest.CaptureFixture[str]) -> None:
+    grid = masks["liver"].grid
+    organ = LabelMap(masks["liver"].voxels, grid, {1: "liver"})
+    tumours = np.zeros(grid.shape, dtype=np.uint8)
+    for number in (1, 2):
+        tumours[masks[f"livertumor{number}"].voxels > 0] = number
+    tumour_map = LabelMap(tumours, grid, {1: "tumour1", 2: "tumour2"})
+    vessels = LabelMap(masks["portalvein"].voxels, grid, {1: "portal"})
+    extractor = MarchingCubes(MarchingCubesParameters())
+    mesher = FTetWild(FTetWildParameters(envelope_mm=1.5))
+    model, report = build_model(organ, tumour_map, vessels, extractor, mesher, ModelSettings())
+    assert abs(report.volume_error) < 0.01
+    assert (model.mesh.corner_volumes_mm3 > 0.0).all()
+    assert model.mesh.surface().is_closed == (report.quality.pinched_edges == 0)
+    assert report.quality.pinched_edges < 10
+    assert report.region_elements["tumour1"] > 0 < report.region_elements["tumour2"]
+    for tumour in model.structures.tumours:
+        assert tumour.volume_mm3 == pytest.approx(1e3 * tumour_map.volume_ml(tumour.name), rel=0.01)
+    portal = model.structures.trees[0]
+    assert portal.name == "portal"
+    # Intrahepatic branches of the first order are 5 to 10 mm wide.
+    assert 2.5 < portal.radii_mm.max() < 5.0
+    back = model.mesh.nodes[model.node_set("back")]
+    middle = model.mesh.nodes.mean(axis=0)
+    assert back[:, 2].mean() > middle[2]
+    assert back[:, 0].mean() < middle[0]
+    with capsys.disabled():
+        print(f"\nmesh of 3D-IRCADb-01 case 17: {report.quality}, volume {100.0 * report.volume_error:+.2f} %")
+
+
+def test_surface_keeps_within_half_a_voxel_of_the_mask(masks: dict[str, LabelMap]) -> None:
+    labels = masks["liver"]
+    mask = labels.mask("liver")
+    surface = MarchingCubes(MarchingCubesParameters()).extract(mask, labels)
+    assert surface.is_closed
+    assert surface.volume_mm3 == pytest.approx(1e3 * labels.volume_ml("liver"), rel=1e-6)
+    faces = border_faces(mask, labels)
+    chosen = np.random.default_rng(0).choice(len(faces), 5000, replace=False)
+    distance, _ = closest_points(faces[chosen], surface)
+    assert np.percentile(distance, 95) < 0.5 * labels.grid.spacing_mm.max()
+
+
+def test_totalsegmentator_labels_and_one_click(shared_data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A scan that ends within the liver, without contrast agent, stored with axes that run backwards."""
+    folder = shared_data / "open" / "totalsegmentator-example"
+    volume = read_volume(folder / "example_ct.nii.gz")
+    given = read_labels(folder / "example_seg_fast_force_split.nii.gz", scheme="totalsegmentator")
+    organ = LabelSegmenter(LabelSegmenterParameters()).segment(volume, given, np.zeros((0, 3)))
+    reference = organ.labels.mask("liver")
+    assert any("touches the scan's last layer along axis k" in reason for _, reason in organ.flagged_slices)
+    assert organ.labels.volume_ml("liver") == pytest.approx(1126.0, rel=0.01)
+    inside = volume.grid.points_from_indices(np.array([[90, 55, 104]]))
+    found = SeededContour(SeededContourParameters()).segment(volume, None, inside).labels.mask("liver")
+    with capsys.disabled():
+        print(f"\nTotalSegmentator's CT from one click: Dice {dice(found, reference):.3f} against its automatic labels")
+    assert dice(found, reference) > 0.92
