@@ -221,7 +221,7 @@ def test_an_interruption_while_results_are_put_in_place_takes_all_back(
             raise KeyboardInterrupt
         real(source, target)
 
-    monkeypatch.setattr("glisson.framework.pipeline.os.replace", interrupted)
+    monkeypatch.setattr("glisson.framework.placing.os.replace", interrupted)
     with pytest.raises(KeyboardInterrupt):
         ran(case)
     assert contents(case) == before

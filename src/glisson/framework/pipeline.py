@@ -5,7 +5,6 @@ into the case, all or none. So an interruption, a failure or a full disk leaves 
 """
 
 import errno
-import os
 import shutil
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,6 +19,7 @@ from glisson.core.registry import technique_class
 from glisson.framework.case import RESULTS, SETTINGS, STALE, Case
 from glisson.framework.hashing import content_hash
 from glisson.framework.lock import exclusive
+from glisson.framework.placing import put_in_place
 from glisson.framework.provenance import StageRecord, record_of
 from glisson.framework.settings import Settings
 from glisson.framework.settings_file import settings_text
@@ -173,46 +173,16 @@ def _current(
         there = [case.path(name) for name in stage.outputs if case.has(name)]
         lost = [place for place in there if content_hash(place) not in outputs.values()]
         moves = [(place, place.with_name(f"previous-{place.name}")) for place in lost] + moves
-    _put_in_place(moves, work)
+    put_in_place(moves, work)
     shutil.rmtree(work, ignore_errors=True)
     heard.ended(stage.name, seconds)
     return seconds, record
 
 
-def _put_in_place(moves: Sequence[tuple[Path, Path]], work: Path) -> None:
-    """Rename files and folders to their places, all or none; what lay there goes into `work`."""
-    for source, _ in moves:
-        for entry in (source, *source.rglob("*")):
-            _flush(entry)
-    undo: list[tuple[Path, Path]] = []
-    try:
-        for number, (source, place) in enumerate(moves):
-            place.parent.mkdir(parents=True, exist_ok=True)
-            aside = work / f"replaced-{number}"
-            for here, there in ((place, aside), (source, place)):
-                if here.exists():
-                    undo.append((there, here))
-                    os.replace(here, there)
-    except BaseException:
-        for here, there in reversed(undo):
-            if here.exists():
-                os.replace(here, there)
-        raise
-
-
-def _flush(path: Path) -> None:
-    # Without this a power cut could leave a new name with nothing in it; a full disk shows here at the latest.
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-
-
 def _keep_settings(case: Case, settings: Settings) -> None:
     if settings != case.settings():
         case.path(_WORK).mkdir(exist_ok=True)
-        _put_in_place([_staged_settings(case, settings)], case.path(_WORK))
+        put_in_place([_staged_settings(case, settings)], case.path(_WORK))
 
 
 def _staged_settings(case: Case, settings: Settings) -> tuple[Path, Path]:
