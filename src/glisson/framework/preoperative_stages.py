@@ -16,7 +16,7 @@ from glisson.framework.case import MODEL, ORGAN, SCAN, SCENARIO, SETTINGS, STRUC
 from glisson.framework.provenance import read_record
 from glisson.framework.settings import GIVEN_LABELS, Settings
 from glisson.framework.stage import Stage
-from glisson.io.images import read_volume, write_labels
+from glisson.io.images import read_labels, read_volume, write_labels
 from glisson.io.model_files import read_model, write_model
 from glisson.io.scenario_files import write_scenario
 from glisson.preoperative.manoeuvre import propose_scenario
