@@ -23,11 +23,11 @@ EXTRACTOR = MarchingCubes(MarchingCubesParameters())
 MESHER = FTetWild(FTetWildParameters())
 
 
-def volume_on(grid: Grid, modality: str = "CT") -> Volume:
+def volume_on(grid: Grid, modality: str = "CT", radius: float = 25.0) -> Volume:
     """A ball of 110 HU in fat, in air."""
     points = grid.points_from_indices(np.moveaxis(np.indices(grid.shape), 0, -1).reshape(-1, 3))
     distance = np.linalg.norm(points, axis=1).reshape(grid.shape)
-    hu = np.select([distance < 25.0, distance < 35.0], [110, -90], -1000).astype(np.int16)
+    hu = np.select([distance < radius, distance < radius + 10.0], [110, -90], -1000).astype(np.int16)
     return Volume(hu, grid, modality)
 
 
@@ -89,9 +89,11 @@ def test_a_click_needs_a_ct_and_something_like_a_liver():
 
 
 def test_a_liver_that_the_scan_cuts_is_flagged():
-    grid = Grid((40, 40, 20), [2.0, 2.0, 2.0], [-39.0, -39.0, 0.0])
-    found = SeededContour(SeededContourParameters()).segment(volume_on(grid), None, np.array([[0.0, 0.0, 10.0]]))
+    grid = Grid((56, 56, 28), [2.0, 2.0, 2.0], [-55.0, -55.0, 0.0])
+    scan = volume_on(grid, radius=45.0)
+    found = SeededContour(SeededContourParameters()).segment(scan, None, np.array([[0.0, 0.0, 10.0]]))
     assert any(k == 0 and "closed there" in reason for k, reason in found.flagged_slices)
+    assert any("Unusual volume for a liver: 19" in reason for _, reason in found.flagged_slices)
 
 
 def test_masks_without_a_surface():

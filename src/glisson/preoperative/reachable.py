@@ -18,7 +18,10 @@ _NARROWEST_PASSAGE = 0.3
 """Basins of equal grey value are joined when the passage is this fraction as wide as the smaller basin …"""
 
 _PASSAGE_PER_HU = 0.08
-""" … and by this much more for each HU between them."""
+""" … and by this much more for each HU between them …"""
+
+_WIDEST_PASSAGE = 0.9
+""" … but a passage about as wide as the smaller basin is no passage between two organs, whatever their HU."""
 
 _VESSEL_AREA_MM2 = 250.0
 """Gaps of the band that are surrounded in a plane and smaller than this are vessels or small tumours."""
@@ -93,7 +96,7 @@ def _joined_basins(basins: IntArray, count: int, width: FloatArray, values: NDAr
         a, b = _root(group, first), _root(group, second)
         if a == b:
             continue
-        needed = _NARROWEST_PASSAGE + _PASSAGE_PER_HU * abs(level[a] - level[b])
+        needed = min(_NARROWEST_PASSAGE + _PASSAGE_PER_HU * abs(level[a] - level[b]), _WIDEST_PASSAGE)
         if passage >= needed * min(widest[a], widest[b]):
             group[b] = a
             widest[a] = max(widest[a], widest[b])

@@ -18,6 +18,7 @@ from glisson.core.image import Grid, LabelMap, Volume
 from glisson.core.parameters import parameter
 from glisson.core.protocols import Progress, Segmentation, silent
 from glisson.core.status import Status
+from glisson.preoperative.axial import slice_axis
 from glisson.preoperative.borders import touched_borders
 from glisson.preoperative.completion import surface_tumours, without_gaps
 from glisson.preoperative.diffusion import diffused
@@ -38,7 +39,9 @@ _EDGE_HU = 20.0
 _SMOOTHING_STEPS = 6
 _GAP_MM = 4.0
 _TUMOUR_ROUNDS = 2
-_SMALLEST_ML = 5.0
+_SMALLEST_ML = 100.0
+_USUAL_ML = (500.0, 4000.0)
+"""Volumes of adults' livers; what is outside is shown to a person."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +106,7 @@ class SeededContour:
         organ, flags = self._contoured(smooth, region, prior, grid, progress)
         full = ndimage.binary_fill_holes(grid.full(organ) | known)
         flags += [(border.slice_near(volume.grid), border.sentence) for border in touched_borders(full)]
+        flags += _volume_flag(full, volume.grid)
         return Segmentation(LabelMap(full.astype(np.uint8), volume.grid, {1: "liver"}), tuple(sorted(flags)))
 
     def _contoured(
@@ -209,6 +213,16 @@ def _require_volume(region: NDArray[np.bool_], grid: WorkingGrid, seeds_mm: Floa
             "click in a larger, even part of the liver.",
             Status.STAGNATED,
         )
+
+
+def _volume_flag(mask: NDArray[np.bool_], grid: Grid) -> list[tuple[int, str]]:
+    """A sentence at the largest slice when the volume is none of an adult's liver."""
+    volume_ml = float(mask.sum()) * grid.voxel_volume_mm3 * 1e-3
+    if _USUAL_ML[0] <= volume_ml <= _USUAL_ML[1]:
+        return []
+    axis = slice_axis(grid)
+    largest = int(np.argmax(mask.sum(axis=tuple(a for a in range(3) if a != axis))))
+    return [(largest, f"Unusual volume for a liver: {volume_ml:.0f} ml; parts may be missing, or others included.")]
 
 
 def _place(point: FloatArray) -> str:
