@@ -10,7 +10,7 @@ numbers of voxels. With H = ½(1 − φ/ε − sin(πφ/ε)/π), 1 inside, and �
 plus λ δ(φ) κ. They descend Σ_y δ(φ(y)) E_y with the local energies E_y = Σ_x B [H (I − u_y)² + (1 − H)(I − v_y)²]
 and E_y = −½(u_y − v_y)²; the variation of the outer δ(φ(y)) is dropped, as in the paper. The paper prints the
 sums with x and y exchanged (I(y) against u_x): then a point moves as its neighbours want, and ripples shorter
-than the ball grow (a noisy disc ends at Dice 0.81 instead of 0.99). The force is brought to (grey value)² by
+than the ball grow. The force is brought to (grey value)² by
 dividing by Σ B δ and, for separation, multiplying by the mean of the areas, and then saturates: F / (|F| + c²)
 with a contrast c. Dividing by the largest |F| instead would let one strong edge stall all the weak ones.
 """
