@@ -76,9 +76,9 @@ def _threads() -> Finding:
     def count() -> str:
         import numba
 
-        return f"{numba.get_num_threads()} threads"
+        return str(numba.get_num_threads())
 
-    return _guarded("numba", count)
+    return _guarded("numba threads", count)
 
 
 def _calculix() -> Finding:
