@@ -106,12 +106,6 @@ class Elasticity:
     def _each_chunk(self, work: Callable[[_Chunk], T]) -> list[T]:
         return list(_threads.map(work, self._chunks))
 
-    def jacobians(self, positions: FloatArray) -> FloatArray:
-        """J = det F (m, q) at the quadrature points."""
-        everything = np.arange(len(self.mesh.tetrahedra))
-        result: FloatArray = np.linalg.det(self._gradients(positions, everything))
-        return result
-
     def _gradients(self, positions: FloatArray, elements: IntArray) -> FloatArray:
         result: FloatArray = _deformation_gradients(
             positions, self.mesh.tetrahedra, self._quadrature.gradients, elements

@@ -1,4 +1,4 @@
-"""Shape functions and quadrature of tetrahedra and of the triangles that bound them."""
+"""Quadrature of tetrahedra and of the triangles that bound them."""
 
 from dataclasses import dataclass
 
@@ -7,9 +7,9 @@ from scipy.special import roots_jacobi, roots_legendre
 
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.mesh import TET_EDGES, TetMesh
+from glisson.geometry.shape_functions import shape_slopes, shape_values
 
-_INNER = (5.0 + 3.0 * np.sqrt(5.0)) / 20.0  # four-point rule of degree 2 (Keast 1986)
-_OUTER = (5.0 - np.sqrt(5.0)) / 20.0
+_OUTER = (5.0 - np.sqrt(5.0)) / 20.0  # of the four-point rule of degree 2 (Keast 1986)
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,26 +18,6 @@ class ElementQuadrature:
 
     gradients: FloatArray
     weights: FloatArray
-
-
-def shape_functions(barycentric: FloatArray, quadratic: bool) -> FloatArray:
-    """N at barycentric coordinates (q, 4): (q, 4) for T4 or (q, 10) for T10."""
-    if not quadratic:
-        return barycentric
-    edges = 4.0 * barycentric[:, TET_EDGES[:, 0]] * barycentric[:, TET_EDGES[:, 1]]
-    return np.hstack([barycentric * (2.0 * barycentric - 1.0), edges])
-
-
-def shape_derivatives(barycentric: FloatArray, quadratic: bool) -> FloatArray:
-    """∂N/∂ξ (q, nodes, 3), ξ being the barycentric coordinates 1, 2 and 3."""
-    by_barycentric = np.tile(np.eye(4), (len(barycentric), 1, 1))
-    if quadratic:
-        corners = by_barycentric * (4.0 * barycentric - 1.0)[:, :, None]
-        first, second = TET_EDGES.T
-        edges = barycentric[:, first, None] * np.eye(4)[second] + barycentric[:, second, None] * np.eye(4)[first]
-        by_barycentric = np.concatenate([corners, 4.0 * edges], axis=1)
-    result: FloatArray = by_barycentric[:, :, 1:] - by_barycentric[:, :, :1]
-    return result
 
 
 def volume_rule(quadratic: bool) -> tuple[FloatArray, FloatArray]:
@@ -52,7 +32,8 @@ def volume_rule(quadratic: bool) -> tuple[FloatArray, FloatArray]:
 def quadrature(nodes: FloatArray, mesh: TetMesh) -> ElementQuadrature:
     """Quadrature of the elements of `mesh` with its nodes at `nodes` (curved T10 edges count)."""
     points, weights = volume_rule(mesh.is_quadratic)
-    derivatives = shape_derivatives(points, mesh.is_quadratic)
+    slopes = shape_slopes(points, mesh.is_quadratic)
+    derivatives = slopes[:, :, 1:] - slopes[:, :, :1]  # the first barycentric coordinate follows from the others
     jacobians = np.einsum("mai,qak->mqik", nodes[mesh.tetrahedra], derivatives)
     gradients = np.einsum("qak,mqki->mqai", derivatives, np.linalg.inv(jacobians))
     volumes = np.linalg.det(jacobians) * weights / 6.0
@@ -63,7 +44,7 @@ def nodal_volumes(nodes: FloatArray, mesh: TetMesh, element_factors: FloatArray)
     """∫ factor N_a dV for every node (n,), `element_factors` (m,) being constant in each element."""
     points, _ = volume_rule(mesh.is_quadratic)
     weights = quadrature(nodes, mesh).weights * element_factors[:, None]
-    parts = np.einsum("mq,qa->ma", weights, shape_functions(points, mesh.is_quadratic))
+    parts = np.einsum("mq,qa->ma", weights, shape_values(points, mesh.is_quadratic))
     volumes: FloatArray = np.bincount(mesh.tetrahedra.ravel(), parts.ravel(), minlength=len(nodes)).astype(np.float64)
     return volumes
 

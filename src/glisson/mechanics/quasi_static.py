@@ -16,7 +16,7 @@ from glisson.mechanics.body import Body
 from glisson.mechanics.contact import ToolContact
 from glisson.mechanics.contact_law import Cushion
 from glisson.mechanics.elasticity import Elasticity
-from glisson.mechanics.elements import surface_quadrature
+from glisson.mechanics.elements import SurfaceQuadrature, surface_quadrature
 from glisson.mechanics.initial_gaps import settle_gaps
 from glisson.mechanics.linear_solvers import make_factorisation
 from glisson.mechanics.newton import Newton, NewtonSettings
@@ -86,7 +86,7 @@ class QuasiStatic:
         parameters = self._parameters
         mesh = model.mesh
         surface = surface_quadrature(mesh.nodes, mesh)
-        rest = self._rest_shape(model, scenario)
+        rest = self._rest_shape(model, scenario, surface)
         stiffest = max(material.young_modulus_kpa for material in model.materials.values())
         slope = max(_CUSHION_STIFFNESS_KPA, _CUSHION_STIFFNESS_MODULI * stiffest) / parameters.contact_range_mm
         cushion = Cushion(parameters.contact_range_mm, slope)
@@ -98,7 +98,7 @@ class QuasiStatic:
             body.external = gravity_forces(model, scenario.scan_gravity)
         return body
 
-    def _rest_shape(self, model: Model, scenario: Scenario) -> RestShape:
+    def _rest_shape(self, model: Model, scenario: Scenario, surface: SurfaceQuadrature) -> RestShape:
         if scenario.rest_shape == "as-scanned" or scenario.scan_gravity is None:
             return RestShape(model.mesh.nodes, {})
         supports = [t for t in scenario.tools if isinstance(t, Board) and t.name in scenario.scan_supports]
@@ -107,7 +107,7 @@ class QuasiStatic:
             model.materials,
             gravity_forces(model, scenario.scan_gravity),
             supports,
-            surface_quadrature(model.mesh.nodes, model.mesh),
+            surface,
             fixed_unknowns(model, scenario.stages[0].fixed),
             self._parameters.surface_tolerance_mm,
         )

@@ -1,7 +1,7 @@
 """What a material law computes, and how the law of a region is found."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 from glisson.core.arrays import FloatArray
 from glisson.core.model import Material
@@ -28,6 +28,20 @@ class Law(Protocol):
 
     def tangent(self, gradients: FloatArray, material: Material) -> FloatArray:
         """∂P/∂F as (n, 9, 9), rows and columns being the row-major entries of P and F."""
+
+
+class PlainLaw:
+    """What every law here shares as a technique: nothing to set, nothing to install."""
+
+    Parameters: ClassVar[type[NoParameters]] = NoParameters
+
+    def __init__(self, parameters: NoParameters) -> None:
+        """A law has nothing to set."""
+
+    @classmethod
+    def missing_dependencies(cls) -> tuple[str, ...]:
+        """Nothing is needed."""
+        return ()
 
 
 def find_law(name: str) -> Law:

@@ -6,23 +6,14 @@ import numpy as np
 
 from glisson.core.arrays import FloatArray
 from glisson.core.model import Material
-from glisson.mechanics.materials.law import NoParameters
+from glisson.mechanics.materials.law import PlainLaw
 
 
-class LinearElastic:
+class LinearElastic(PlainLaw):
     """Linear in the displacement gradient: cheap, and wrong wherever the organ turns."""
 
     name: ClassVar[str] = "linear-elastic"
     summary: ClassVar[str] = "small strain, not frame-indifferent (dissertation, eq. 2.16)"
-    Parameters: ClassVar[type[NoParameters]] = NoParameters
-
-    def __init__(self, parameters: NoParameters) -> None:
-        """A law has nothing to set."""
-
-    @classmethod
-    def missing_dependencies(cls) -> tuple[str, ...]:
-        """Nothing is needed."""
-        return ()
 
     def energy(self, gradients: FloatArray, material: Material) -> FloatArray:
         """W = λ/2 tr(ε)² + µ ε:ε, (n,) in kPa."""

@@ -7,23 +7,14 @@ import numpy as np
 from glisson.core.arrays import FloatArray
 from glisson.core.model import Material
 from glisson.mechanics.materials.isotropic import combined_stress, combined_tangent, kinematics
-from glisson.mechanics.materials.law import NoParameters
+from glisson.mechanics.materials.law import PlainLaw
 
 
-class NeoHookean:
+class NeoHookean(PlainLaw):
     """The dissertation's law with C1 = µ/2, D1 = κ/2: volume-preserving and volumetric parts are separate."""
 
     name: ClassVar[str] = "neo-hookean"
     summary: ClassVar[str] = "hyperelastic, volumetric part separate (dissertation, eq. 2.19)"
-    Parameters: ClassVar[type[NoParameters]] = NoParameters
-
-    def __init__(self, parameters: NoParameters) -> None:
-        """A law has nothing to set."""
-
-    @classmethod
-    def missing_dependencies(cls) -> tuple[str, ...]:
-        """Nothing is needed."""
-        return ()
 
     def energy(self, gradients: FloatArray, material: Material) -> FloatArray:
         """W (n,) in kPa; infinite where J ≤ 0, though (J − 1)² alone would stay finite there."""

@@ -7,23 +7,14 @@ import numpy as np
 from glisson.core.arrays import FloatArray
 from glisson.core.model import Material
 from glisson.mechanics.materials.isotropic import combined_stress, combined_tangent, kinematics
-from glisson.mechanics.materials.law import NoParameters
+from glisson.mechanics.materials.law import PlainLaw
 
 
-class NeoHookeanLog:
+class NeoHookeanLog(PlainLaw):
     """The form of Bonet and Wood, Nonlinear Continuum Mechanics, eq. 6.27; public liver data uses it."""
 
     name: ClassVar[str] = "neo-hookean-log"
     summary: ClassVar[str] = "hyperelastic, logarithmic volume term (Bonet and Wood)"
-    Parameters: ClassVar[type[NoParameters]] = NoParameters
-
-    def __init__(self, parameters: NoParameters) -> None:
-        """A law has nothing to set."""
-
-    @classmethod
-    def missing_dependencies(cls) -> tuple[str, ...]:
-        """Nothing is needed."""
-        return ()
 
     def energy(self, gradients: FloatArray, material: Material) -> FloatArray:
         """W (n,) in kPa; infinite where J ≤ 0."""
