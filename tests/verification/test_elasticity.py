@@ -1,9 +1,12 @@
 import numpy as np
 import pytest
 from bodies import body_of, box_mesh, distorted, solve
+from scipy.sparse import bsr_matrix
 
 from glisson.core import Material
+from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.materials.law import find_law
+from glisson.mechanics.pattern import block_pattern
 
 LAWS = ("linear-elastic", "neo-hookean", "neo-hookean-log")
 HYPERELASTIC = LAWS[1:]
@@ -132,3 +135,29 @@ def test_body_forces_and_stiffness_are_derivatives(law_name: str) -> None:
         numeric = (body.elasticity.energy(positions + h * direction) - body.elasticity.energy(positions)) / h
         assert numeric == pytest.approx(float(np.vdot(forces, direction)), rel=50 * h)
     assert np.log10(rest[0] / rest[1]) == pytest.approx(2.0, abs=0.1)
+
+
+@pytest.mark.parametrize("quadratic", [False, True], ids=["T4", "T10"])
+@pytest.mark.parametrize("law_name", HYPERELASTIC)
+def test_derivative_by_the_unloaded_shape(quadratic: bool, law_name: str) -> None:
+    """Taylor test of the internal forces at deformed positions that are held while the unloaded ones move."""
+    mesh = distorted(box_mesh((30.0, 20.0, 10.0), (2, 2, 1)), 1.0)
+    mesh = mesh.as_quadratic() if quadratic else mesh
+    materials = {int(mesh.region_numbers[0]): Material(law_name, 7.0, 0.45)}
+    rng = np.random.default_rng(6)
+    rest = mesh.nodes + rng.uniform(-0.5, 0.5, mesh.nodes.shape)
+    direction = rng.uniform(-1, 1, mesh.nodes.shape)
+    pattern = block_pattern(mesh.tetrahedra, len(mesh.nodes))
+    blocks = np.zeros((pattern.block_count, 3, 3))
+    at_rest = Elasticity(mesh, materials, rest)
+    at_rest.add_rest_derivative(mesh.nodes, pattern, blocks)
+    change = (bsr_matrix((blocks, pattern.indices, pattern.indptr)) @ direction.ravel()).reshape(direction.shape)
+    remainders = [
+        np.abs(
+            Elasticity(mesh, materials, rest + h * direction).forces(mesh.nodes)
+            - at_rest.forces(mesh.nodes)
+            - h * change
+        ).max()
+        for h in (1e-2, 1e-3)
+    ]
+    assert np.log10(remainders[0] / remainders[1]) == pytest.approx(2.0, abs=0.1)

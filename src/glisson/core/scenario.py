@@ -14,7 +14,8 @@ class Board:
     """A plane that the organ lies on; `normal` points from the board towards the organ.
 
     A `conforming` board is bedding or neighbouring tissue that has taken the shape of the organ's
-    underside in the scan: it carries every downward-facing part of the surface where the scan shows it.
+    underside in the scan: it carries every downward-facing part of the surface where the scan shows it,
+    and yields to sharp edges by a fraction of a millimetre.
     """
 
     name: str

@@ -70,20 +70,15 @@ class Body:
                 contact.update_friction(touch, self.law)
         return touches
 
-    def renew_cohesion(self, positions: FloatArray) -> None:
-        """Let cohesion act where tools press now."""
-        for contact, touch in zip(self.contacts, self.touches(positions, update_friction=False), strict=True):
-            contact.update_cohesion(touch)
+    def renew_cohesion(self, positions: FloatArray) -> int:
+        """Let cohesion act where tools press now; how many surface points lost it thereby."""
+        touches = self.touches(positions, update_friction=False)
+        return sum(c.renew_cohesion(touch) for c, touch in zip(self.contacts, touches, strict=True))
 
     def add_cohesion(self, touches: Sequence[Touch]) -> None:
-        """Let cohesion begin at surface points that newly press."""
+        """Let surface points that newly touch cohere at once."""
         for contact, touch in zip(self.contacts, touches, strict=True):
             contact.add_cohesion(touch)
-
-    def drop_cohesion(self, touches: Sequence[Touch]) -> None:
-        """End the cohesion of surface points that do not touch; it is not regained in this load step."""
-        for contact, touch in zip(self.contacts, touches, strict=True):
-            contact.drop_cohesion(touch)
 
     def energy(self, positions: FloatArray) -> float:
         """Potential in µJ with friction limits as last updated; infinite where an element is inverted."""
@@ -118,6 +113,13 @@ class Body:
             used, local = contact.stiffness(touch, points, project)
             scatter_blocks(used, local, self.surface.shapes, self._pairs, blocks)
         return blocks
+
+    def add_friction_by_pressure(self, positions: FloatArray, touches: Sequence[Touch], blocks: FloatArray) -> None:
+        """Make the stiffness the exact derivative of the forces, friction limits following the pressure."""
+        points = self.surface.positions(positions)
+        for contact, touch in zip(self.contacts, touches, strict=True):
+            used, local = contact.friction_by_pressure(touch, points, self.law)
+            scatter_blocks(used, local, self.surface.shapes, self._pairs, blocks)
 
     def add_bonds(self, positions: FloatArray, blocks: FloatArray) -> None:
         """Glue what nearly touches to its tool, for the first guess of a body that nothing holds yet."""

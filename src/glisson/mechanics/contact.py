@@ -9,7 +9,6 @@ from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.scenario import ContactLaw
 from glisson.mechanics.contact_law import (
     Cushion,
-    cohesion_share,
     shear_limit,
     shear_share,
     shear_slope,
@@ -17,6 +16,8 @@ from glisson.mechanics.contact_law import (
 )
 from glisson.mechanics.elements import SurfaceQuadrature
 from glisson.mechanics.tools import RigidTool
+
+_GLUE_SHARE = 0.05  # of the cushion's stiffness
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +50,7 @@ class ToolContact:
         self.anchored = np.zeros(count, dtype=bool)
         self._surface = surface
         self._stick_mm = stick_mm
-        self._cohesion = np.zeros(count)
+        self._cohering = np.zeros(count, dtype=bool)
         self._limits = np.zeros(count)
         self._lagged_normals = np.zeros((count, 3))
 
@@ -70,28 +71,24 @@ class ToolContact:
         pressures = self.cushion.pressure(gaps[near])
         return Touch(near, local[near], gaps[near], pressures, normals[near], curvatures[near], rotation)
 
-    def update_cohesion(self, touch: Touch) -> None:
-        """Let cohesion act where the present pressure says so (at the start of a load step)."""
-        self._cohesion[:] = 0.0
-        self._cohesion[touch.points] = cohesion_share(touch.pressures)
+    def renew_cohesion(self, touch: Touch) -> int:
+        """Let exactly the touching points cohere; how many of those that did had left the tool."""
+        touching = np.zeros_like(self._cohering)
+        touching[touch.points] = True
+        left = int((self._cohering & ~touching).sum())
+        self._cohering = touching
+        return left
 
     def add_cohesion(self, touch: Touch) -> None:
-        """Let cohesion begin where points newly press."""
-        share = cohesion_share(touch.pressures)
-        self._cohesion[touch.points] = np.maximum(self._cohesion[touch.points], share)
-
-    def drop_cohesion(self, touch: Touch) -> None:
-        """End the cohesion of points that have left the tool."""
-        left = np.ones_like(self.anchored)
-        left[touch.points] = False
-        self._cohesion[left] = 0.0
+        """Let points that newly touch cohere at once."""
+        self._cohering[touch.points] = True
 
     def update_friction(self, touch: Touch, law: ContactLaw) -> None:
         """Take shear limits and normals from the present state; anchor the points that newly touch.
 
         A point that left the tool loses its anchor, unless cohesion still acts on it in this pass.
         """
-        touching = self._cohesion > 0.0
+        touching = self._cohering.copy()
         touching[touch.points] = True
         pressures = np.zeros(len(touching))
         pressures[touch.points] = touch.pressures
@@ -100,7 +97,7 @@ class ToolContact:
         new = touching & ~self.anchored
         self.anchors[new] = local[new]
         self.anchored = touching
-        self._limits = shear_limit(pressures, self._cohesion, law)
+        self._limits = shear_limit(pressures, self._cohering, law)
         self._lagged_normals[touch.points] = touch.normals
 
     def drag_anchors(self, points_mm: FloatArray) -> None:
@@ -144,10 +141,37 @@ class ToolContact:
         local = blocks[used] * self._surface.areas[used, None, None]
         return used, touch.rotation @ local @ touch.rotation.T
 
+    def friction_by_pressure(self, touch: Touch, points_mm: FloatArray, law: ContactLaw) -> tuple[IntArray, FloatArray]:
+        """What `stiffness` leaves out: friction that follows the pressure, at points (k,) as (k, 3, 3) in mN/mm.
+
+        With it the linearisation is exact and not symmetric.
+        """
+        slipping, slips, lengths = self._slips(points_mm)
+        share = shear_share(lengths, self._stick_mm) / np.maximum(lengths, 1e-300)
+        along = np.zeros_like(points_mm)
+        along[slipping] = share[:, None] * slips
+        used = touch.points
+        slope = -law.friction * self.cushion.slope(touch.gaps) * self._surface.areas[used]
+        local = slope[:, None, None] * along[used][:, :, None] * touch.normals[:, None, :]
+        return used, touch.rotation @ local @ touch.rotation.T
+
     def bond(self, points_mm: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Points (k,) nearly in touch, and blocks (k, 3, 3) in mN/mm that would glue them to the tool."""
+        """Points (k,) nearly in touch, and blocks (k, 3, 3) in mN/mm that hold them on the tool.
+
+        They guide a body that nothing holds yet: where friction has begun, by its secant, which unlike its
+        tangent does not vanish when it slips; elsewhere by a soft glue.
+        """
         near = np.flatnonzero(self.gaps(points_mm) < 2.0 * self.cushion.range_mm)
-        return near, (self.cushion.stiffness_kpa_mm * self._surface.areas[near])[:, None, None] * np.eye(3)
+        glue = _GLUE_SHARE * self.cushion.stiffness_kpa_mm
+        along = np.full(len(self._limits), glue)
+        slipping, _, lengths = self._slips(points_mm)
+        along[slipping] = self._limits[slipping] / np.maximum(lengths, self._stick_mm)
+        rotation, translation = self.tool.pose(self.angle)
+        _, normals, _ = self.tool.distance((points_mm[near] - translation) @ rotation)
+        normals = normals @ rotation.T
+        outer = normals[:, :, None] * normals[:, None, :]
+        held = glue * outer + along[near, None, None] * (np.eye(3) - outer)
+        return near, self._surface.areas[near, None, None] * held
 
     def sticking(self, touch: Touch, points_mm: FloatArray) -> tuple[float, float]:
         """Share of the touching area that sticks, and the largest slip from an anchor (mm)."""

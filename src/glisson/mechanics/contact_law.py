@@ -1,14 +1,15 @@
 """The contact law, once for all tools: pressure over gap, and friction with cohesion over slip.
 
-Normal direction: the pressure is zero at gaps over `range_mm`, then rises with the slope
-`stiffness_kpa_mm`, smoothly at first, so that the energy has two derivatives. The range is a cushion: a
-pressure of p rests at a gap of about range − p / stiffness, which must stay positive at convergence (the
-solver stiffens the cushion where it does not). Unlike a logarithmic barrier it is finite everywhere, so
-a tool may move millimetres in one step and Newton's method pulls the organ after it.
+Normal direction: the pressure is zero at gaps over `range_mm`, rises as the square of the depth down to
+gap 0 and then with the slope `stiffness_kpa_mm`, so that the energy has two derivatives. The range is a
+cushion, in which all gaps must lie at the end of a stage (the solver stiffens the cushion where they do
+not). Unlike a logarithmic barrier it is finite everywhere, so a tool may move millimetres in one step and
+Newton's method pulls the organ after it; and it may be soft while tools move, which takes a third of the
+iterations and shifts the organ by less than the range.
 
-Tangential direction: |τ| ≤ limit = friction · p + cohesion · χ(p), where χ rises from 0 to 1 over the
-first `COHESION_ONSET_KPA` of pressure: cohesion is shear only and needs touch. That slope is so steep that
-χ may not follow the pressure freely within a load step (Newton's method would cycle); see `Newton.solve`.
+Tangential direction: |τ| ≤ friction · p, and cohesion more where the surface coheres: cohesion is shear
+only and needs touch. This jump is no function that Newton's method could follow (it would cycle), so who
+coheres is decided between its solutions; see `StageRunner`.
 A point sticks to its anchor on the tool like a stiff spring until the limit is reached over `stick_mm` of
 slip (the C1 law of Li et al., Incremental Potential Contact, 2020, section 5). Anchors stay over load
 steps and are dragged only as far as the point really slipped; a held body therefore does not creep.
@@ -17,12 +18,10 @@ steps and are dragged only as far as the point really slipped; a held body there
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from glisson.core.arrays import FloatArray
 from glisson.core.scenario import ContactLaw
-
-COHESION_ONSET_KPA = 0.02
-_SMOOTH_SHARE = 0.2  # share of the range over which the slope rises from zero
 
 
 @dataclass(frozen=True)
@@ -32,14 +31,10 @@ class Cushion:
     range_mm: float
     stiffness_kpa_mm: float
 
-    @property
-    def _onset(self) -> float:
-        return _SMOOTH_SHARE * self.range_mm
-
     def energy(self, gaps: FloatArray) -> FloatArray:
         """Energy per area, kPa·mm."""
         depth = np.maximum(self.range_mm - gaps, 0.0)
-        onset = self._onset
+        onset = self.range_mm
         beyond = 0.5 * depth**2 - 0.5 * onset * depth + onset**2 / 6.0
         energy: FloatArray = self.stiffness_kpa_mm * np.where(depth < onset, depth**3 / (6.0 * onset), beyond)
         return energy
@@ -47,7 +42,7 @@ class Cushion:
     def pressure(self, gaps: FloatArray) -> FloatArray:
         """Pressure in kPa, −∂energy/∂gap."""
         depth = np.maximum(self.range_mm - gaps, 0.0)
-        onset = self._onset
+        onset = self.range_mm
         rise = np.where(depth < onset, depth**2 / (2.0 * onset), depth - 0.5 * onset)
         pressure: FloatArray = self.stiffness_kpa_mm * rise
         return pressure
@@ -55,13 +50,13 @@ class Cushion:
     def slope(self, gaps: FloatArray) -> FloatArray:
         """−∂pressure/∂gap in kPa/mm."""
         depth = np.maximum(self.range_mm - gaps, 0.0)
-        slope: FloatArray = self.stiffness_kpa_mm * np.minimum(depth / self._onset, 1.0)
+        slope: FloatArray = self.stiffness_kpa_mm * np.minimum(depth / self.range_mm, 1.0)
         return slope
 
     def gap(self, pressures: FloatArray) -> FloatArray:
         """The gap at which a pressure ≥ 0 rests (the inverse of `pressure`)."""
         rise = pressures / self.stiffness_kpa_mm
-        onset = self._onset
+        onset = self.range_mm
         depth = np.where(rise < 0.5 * onset, np.sqrt(2.0 * onset * rise), rise + 0.5 * onset)
         gap: FloatArray = self.range_mm - depth
         return gap
@@ -71,16 +66,9 @@ class Cushion:
         return Cushion(self.range_mm, self.stiffness_kpa_mm * factor)
 
 
-def cohesion_share(pressures: FloatArray) -> FloatArray:
-    """χ in 0 to 1 at pressures in kPa."""
-    touch = np.minimum(pressures / COHESION_ONSET_KPA, 1.0)
-    share: FloatArray = touch * touch * (3.0 - 2.0 * touch)
-    return share
-
-
-def shear_limit(pressures: FloatArray, cohesion_shares: FloatArray, law: ContactLaw) -> FloatArray:
-    """Largest shear stress in kPa at the given pressures and shares χ."""
-    limit: FloatArray = law.friction * pressures + law.cohesion_kpa * cohesion_shares
+def shear_limit(pressures: FloatArray, cohering: NDArray[np.bool_], law: ContactLaw) -> FloatArray:
+    """Largest shear stress in kPa at the given pressures, and where the surface coheres."""
+    limit: FloatArray = law.friction * pressures + law.cohesion_kpa * cohering
     return limit
 
 

@@ -88,13 +88,41 @@ class Elasticity:
         semi-definite (Teran et al. 2005).
         """
 
-        def part(chunk: _Chunk) -> FloatArray:
-            gradients = self._gradients(positions, chunk.elements).reshape(-1, 3, 3)
-            tangents = chunk.law.tangent(gradients, chunk.material)
+        def tangents(gradients: FloatArray, chunk: _Chunk) -> FloatArray:
+            found = chunk.law.tangent(gradients, chunk.material)
             if project:
-                _cut_negative(tangents)
+                _cut_negative(found)
+            return found
+
+        self._assemble(tangents, positions, pattern, blocks)
+
+    def add_rest_derivative(self, positions: FloatArray, pattern: BlockPattern, blocks: FloatArray) -> None:
+        """Add the derivative of the internal forces by the unloaded positions, ∂²Ψ/∂x∂X, to `blocks` (b, 3, 3).
+
+        With x held and X moved by δX the deformation gradient changes by −F ∇δX. Pulled back to the unloaded
+        shape this is −A : (F ∇δX) ∇N_a, and two terms of P from the change of ∇N and of the volume; the
+        matrix is not symmetric.
+        """
+
+        def tangents(gradients: FloatArray, chunk: _Chunk) -> FloatArray:
+            tangent = chunk.law.tangent(gradients, chunk.material)
+            return _rest_tangents(tangent, chunk.law.stress(gradients, chunk.material), gradients)
+
+        self._assemble(tangents, positions, pattern, blocks)
+
+    def _assemble(
+        self,
+        tangents: Callable[[FloatArray, _Chunk], FloatArray],
+        positions: FloatArray,
+        pattern: BlockPattern,
+        blocks: FloatArray,
+    ) -> None:
+        """Add Σ w ∇Nᵀ T ∇N, with T (n, 9, 9) from the deformation gradients (n, 3, 3) of a chunk."""
+
+        def part(chunk: _Chunk) -> FloatArray:
+            found = tangents(self._gradients(positions, chunk.elements).reshape(-1, 3, 3), chunk)
             weights = self._quadrature.weights[chunk.elements]
-            stiffness: FloatArray = _element_stiffness(tangents, self._quadrature.gradients, weights, chunk.elements)
+            stiffness: FloatArray = _element_stiffness(found, self._quadrature.gradients, weights, chunk.elements)
             return stiffness
 
         # As many chunks at a time as there are cores, so that memory stays bounded.
@@ -190,3 +218,23 @@ def _cut_negative(tangents: FloatArray) -> None:
         values, vectors = np.linalg.eigh(tangents[n])
         if values[0] < 0.0:
             tangents[n] = (vectors * np.maximum(values, 0.0)) @ vectors.T
+
+
+@njit(cache=True, nogil=True)
+def _rest_tangents(tangents: FloatArray, stress: FloatArray, gradients: FloatArray) -> FloatArray:
+    """−A F − P_iM 1_Jk + P_iJ 1_kM as (n, 9, 9), rows iJ and columns kM."""
+    result = np.zeros_like(tangents)
+    for n in range(len(tangents)):
+        for row in range(9):
+            for k in range(3):
+                for m in range(3):
+                    value = 0.0
+                    for i in range(3):
+                        value -= tangents[n, row, 3 * i + m] * gradients[n, i, k]
+                    result[n, row, 3 * k + m] = value
+        for i in range(3):
+            for j in range(3):
+                for m in range(3):
+                    result[n, 3 * i + j, 3 * j + m] -= stress[n, i, m]
+                    result[n, 3 * i + j, 3 * m + m] += stress[n, i, j]
+    return result

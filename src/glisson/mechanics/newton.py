@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.linalg import LinearOperator, gmres
 
 from glisson.core.arrays import FloatArray
 from glisson.core.status import Status
@@ -15,9 +17,12 @@ from glisson.mechanics.linear_solvers import Factorisation
 _ARMIJO = 1e-4
 _HALVINGS = 40
 _ROUND_OFF = 1e-13  # share of the energy that may be lost to rounding in a difference of energies
-_SETTLED_RESIDUAL = 0.1  # above it cohesion begins where points press, below it cohesion only ends
 _LONGEST_STEP = 0.05  # of the body's diagonal, for any node in one iteration
-_LONG_STEPS = 8  # steps at the length limit in a row before a free motion is looked for
+_COUPLED_RESIDUAL = 1e-2
+_COUPLED_ACCURACY = 1e-3
+_COUPLED_GAIN = 0.3
+_KRYLOV_VECTORS = 20
+_LOOSE_STEPS = 8  # steps in a row of a body that nothing holds, before its free motion is looked for
 
 
 @dataclass(frozen=True)
@@ -39,6 +44,18 @@ class NewtonEnd:
     reason: str = ""
 
 
+@dataclass(frozen=True, eq=False)
+class _Direction:
+    """A step (n, 3) in mm, and whether the body was held without glue and without a limit on the step.
+
+    `blocks` (b, 3, 3) is the stiffness whose factor is at hand, where it is that of a held body.
+    """
+
+    step: FloatArray
+    held: bool
+    blocks: FloatArray | None = None
+
+
 class Newton:
     """Minimises the potential of a body; keeps the factorisation's analysis over calls."""
 
@@ -48,32 +65,38 @@ class Newton:
         self._settings = settings
         self._longest_step_mm = _LONGEST_STEP * float(np.linalg.norm(np.ptp(body.elasticity.rest, axis=0)))
 
-    def solve(self, positions: FloatArray) -> NewtonEnd:
-        """Equilibrium near `positions` with the body's present tools, loads and friction law.
+    def solve(self, positions: FloatArray, tolerance: float | None = None) -> NewtonEnd:
+        """Equilibrium near `positions` with the body's present tools, loads, friction law and cohering points.
 
-        Cohesion may begin at new points while the residual is large, and end while it is small: each only
-        in one direction, so that the iteration cannot cycle between the two.
+        A looser `tolerance` than that of the settings serves where the points that cohere are still sought.
         """
         body, settings = self._body, self._settings
-        long_steps = 0
+        tolerance = settings.tolerance if tolerance is None else tolerance
+        loose_steps = 0
         for iteration in range(settings.iteration_limit + 1):
             touches = body.touches(positions)
             balance = body.balance(positions, touches)
-            (body.add_cohesion if balance.residual > _SETTLED_RESIDUAL else body.drop_cohesion)(touches)
-            if balance.residual <= settings.tolerance:
+            if balance.residual <= tolerance:
                 return NewtonEnd(positions, Status.CONVERGED, iteration, balance.residual)
-            if iteration == settings.iteration_limit or long_steps == _LONG_STEPS:
+            if iteration == settings.iteration_limit or loose_steps == _LOOSE_STEPS:
                 break
             direction = self._direction(positions, touches, balance.unbalanced)
             if direction is None:
                 return self._ended(positions, Status.STAGNATED, iteration, balance)
-            share = self._allowed_share(direction)
-            moved = self._search(positions, share * direction, balance)
+            moved = self._coupled(positions, touches, balance, direction)
+            if moved is None:
+                moved = self._search(positions, direction.step, balance)
             if moved is None:
                 return self._ended(positions, Status.STAGNATED, iteration, balance)
-            long_steps = long_steps + 1 if share < 1.0 else 0
+            loose_steps = 0 if direction.held else loose_steps + 1
+            if not direction.held:
+                body.add_cohesion(touches)  # perhaps nothing else holds it
             positions = moved
         return self._ended(positions, Status.ITERATION_LIMIT, iteration, balance)
+
+    def is_exact(self, end: NewtonEnd) -> bool:
+        """Whether an end reached the tolerance of the settings and not only a looser one."""
+        return end.status is Status.CONVERGED and end.residual <= self._settings.tolerance
 
     def predict(self, positions: FloatArray, angles: Sequence[float], external: FloatArray) -> FloatArray:
         """First-order answer (n, 3) to turning the tools to `angles` and changing the dead loads.
@@ -87,37 +110,86 @@ class Newton:
         forces = body.balance(positions, touches).unbalanced + body.tool_motion_forces(positions, touches, angles)
         forces += np.where(body.fixed, 0.0, external - body.external)
         direction = self._direction(positions, touches, forces)
-        if direction is None:
-            return np.zeros_like(positions)
-        return self._allowed_share(direction) * direction
+        return np.zeros_like(positions) if direction is None else direction.step
 
     def _allowed_share(self, direction: FloatArray) -> float:
         """How much of a step may be taken: an organ that nothing holds yet must not fly away."""
         longest = float(np.linalg.norm(direction, axis=1).max())
         return min(1.0, self._longest_step_mm / longest) if longest > 0.0 else 1.0
 
-    def _direction(self, positions: FloatArray, touches: Sequence[Touch], forces: FloatArray) -> FloatArray | None:
-        """Newton's direction; the stiffness is made definite only when Cholesky refuses the exact one."""
+    def _direction(self, positions: FloatArray, touches: Sequence[Touch], forces: FloatArray) -> _Direction | None:
+        """Newton's direction; the stiffness is made definite only when Cholesky refuses the exact one.
+
+        A body that would fly away is first glued to the tools it nearly touches, until their pressure, and with
+        it their friction, has come to bear.
+        """
         body = self._body
         for project in (False, True):
             blocks = body.stiffness(positions, touches, project)
-            upper = body.upper(blocks)
-            if self._factorisation.factor(upper):
-                return self._solved(forces)
+            direction = self._solved(body.upper(blocks), forces)
+            if direction is not None:
+                break
+        if direction is not None and self._allowed_share(direction) == 1.0:
+            return _Direction(direction, held=True, blocks=blocks)
         body.add_bonds(positions, blocks)
         upper = body.upper(blocks)
-        if self._factorisation.factor(upper):
-            return self._solved(forces)
+        glued = self._solved(upper, forces)
+        if glued is not None:
+            return _Direction(self._allowed_share(glued) * glued, held=False)
         # A motion without stiffness is left: a small spring on every unknown keeps the step finite.
         diagonal = upper.diagonal()
         for share in (1e-8, 1e-6, 1e-4, 1e-2):
             shifted = upper.copy()
             shifted.setdiag(diagonal + share * diagonal.mean())
-            if self._factorisation.factor(shifted):
-                return self._solved(forces)
+            direction = self._solved(shifted, forces)
+            if direction is not None:
+                return _Direction(self._allowed_share(direction) * direction, held=False)
         return None
 
-    def _solved(self, forces: FloatArray) -> FloatArray | None:
+    def _coupled(
+        self, positions: FloatArray, touches: Sequence[Touch], balance: Balance, direction: _Direction
+    ) -> FloatArray | None:
+        """Near the end, the exact step, in which friction follows the pressure; None where it does not pay.
+
+        Without it the iteration converges only linearly. The matrix is not symmetric and friction has no
+        energy: GMRES with the symmetric factor solves, and the residual judges.
+        """
+        body = self._body
+        if direction.blocks is None or balance.residual > _COUPLED_RESIDUAL or body.law.friction == 0.0:
+            return None
+        blocks, free = direction.blocks.copy(), body.system.free
+        body.add_friction_by_pressure(positions, touches, blocks)
+        whole = np.zeros(positions.size)
+
+        def times(values: FloatArray) -> FloatArray:
+            whole[free] = values
+            result: FloatArray = body.times(blocks, whole.reshape(positions.shape)).ravel()[free]
+            return result
+
+        shape = (len(free), len(free))
+        step = np.zeros(positions.size)
+        step[free], _ = gmres(
+            LinearOperator(shape, times, dtype=float),
+            balance.unbalanced.ravel()[free],
+            x0=direction.step.ravel()[free],
+            M=LinearOperator(shape, self._factorisation.solve, dtype=float),
+            rtol=_COUPLED_ACCURACY,
+            restart=_KRYLOV_VECTORS,
+            maxiter=1,
+        )
+        moved = positions + step.reshape(positions.shape)
+        if not np.isfinite(body.elasticity.energy(moved)):
+            return None
+        found = body.balance(moved, body.touches(moved))
+        if found.residual < _COUPLED_GAIN * balance.residual:
+            return moved
+        body.touches(positions)  # friction as it was
+        return None
+
+    def _solved(self, upper: csr_matrix, forces: FloatArray) -> FloatArray | None:
+        """The displacement (n, 3) under the forces; None where the matrix is not definite."""
+        if not self._factorisation.factor(upper):
+            return None
         free = self._body.system.free
         direction = np.zeros(forces.size)
         direction[free] = self._factorisation.solve(forces.ravel()[free])

@@ -24,8 +24,8 @@ from glisson.mechanics.rest_shape import RestShape, find_rest_shape
 from glisson.mechanics.stages import StageRunner, fixed_unknowns, gravity_forces
 from glisson.mechanics.tools import make_tool
 
-_CUSHION_STIFFNESS_KPA = 60.0  # over the range; see `Cushion`
-_CUSHION_STIFFNESS_MODULI = 3.0
+_CUSHION_STIFFNESS_KPA = 36.0  # over the range; see `Cushion`
+_CUSHION_STIFFNESS_MODULI = 1.8
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class QuasiStaticParameters:
     tolerance: float = parameter(1e-6, "residual over the largest force at which a step has converged", 1e-12, 1e-3)
     step_deg: float = parameter(4.0, "largest turn of a lever in one load step, in degrees", 0.05, 15.0)
     contact_range_mm: float = parameter(0.1, "gap in mm at which a tool begins to press", 1e-3, 2.0)
-    stick_mm: float = parameter(0.02, "elastic slip in mm before friction gives way", 1e-4, 1.0)
+    stick_mm: float = parameter(0.2, "elastic slip in mm before friction gives way", 1e-4, 1.0)
     surface_tolerance_mm: float = parameter(
         2.0, "how far in mm the scanned surface may lie from a tool and still be taken as touching it", 0.0, 10.0
     )

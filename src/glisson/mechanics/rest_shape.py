@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
+from scipy.sparse import bsr_matrix
+from scipy.sparse.linalg import LinearOperator, gmres
 
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.errors import StageFailed
@@ -28,6 +29,8 @@ from glisson.mechanics.pattern import FreeSystem, block_pattern, pair_slots
 
 _TOLERANCE = 1e-8
 _ITERATION_LIMIT = 60
+_LINEAR_TOLERANCE = 1e-3
+_KRYLOV_VECTORS = 40
 _WEIGHT_SHARES = (0.25, 0.5, 0.75, 1.0)
 _BED_STIFFNESS_SHARE = 10.0  # bed stiffness in Young's moduli per mm: a weight of 0.6 kPa sinks in by 0.01 mm
 _FACING = -0.5  # a surface point lies on a board when its outward normal is turned this much towards it
@@ -84,7 +87,10 @@ def find_rest_shape(
 
 
 class _InverseProblem:
-    """Residual and search for X; the forward stiffness at (X, A) stands in for the exact derivative."""
+    """Residual, derivative and search for X.
+
+    The derivative is not symmetric; the forward stiffness at (X, A), which is near it, preconditions GMRES.
+    """
 
     def __init__(
         self,
@@ -104,7 +110,7 @@ class _InverseProblem:
         self._share = 1.0
 
     def solve(self) -> FloatArray:
-        """X by a quasi-Newton iteration with backtracking on the residual, the weight brought on in steps."""
+        """X by Newton's method with backtracking on the residual, the weight brought on in steps."""
         positions = np.array(self._mesh.nodes)
         factorisation = make_factorisation()
         try:
@@ -123,11 +129,10 @@ class _InverseProblem:
             size = float(np.linalg.norm(force))
             if size <= _TOLERANCE * reference:
                 return positions
-            if not factorisation.factor(self._stiffness(positions)):
+            step = self._step(positions, force, factorisation)
+            if step is None:
                 break
-            step = np.zeros(force.size)
-            step[self._system.free] = factorisation.solve(-force.ravel()[self._system.free])
-            found = self._search(positions, step.reshape(force.shape), size)
+            found = self._search(positions, step, size)
             if found is None:
                 break
             positions, force = found
@@ -159,15 +164,43 @@ class _InverseProblem:
         force[self._fixed] = 0.0
         return force
 
-    def _stiffness(self, positions: FloatArray) -> csr_matrix:
-        blocks = np.zeros((self._pattern.block_count, 3, 3))
+    def _step(self, positions: FloatArray, force: FloatArray, factorisation: Factorisation) -> FloatArray | None:
+        """Newton's step (n, 3); None where the forward stiffness is not definite."""
         elasticity = Elasticity(self._mesh, self._materials, positions)
-        elasticity.add_stiffness(self._mesh.nodes, self._pattern, blocks, project=True)
+        beds = self._bed_stiffness(positions)
+        stiffness, derivative = beds.copy(), -beds
+        elasticity.add_stiffness(self._mesh.nodes, self._pattern, stiffness, project=True)
+        if not factorisation.factor(self._system.matrix(stiffness)):
+            return None
+        elasticity.add_rest_derivative(self._mesh.nodes, self._pattern, derivative)
+        matrix = bsr_matrix((derivative, self._pattern.indices, self._pattern.indptr))
+        free, whole = self._system.free, np.zeros(force.size)
+
+        def times(values: FloatArray) -> FloatArray:
+            whole[free] = values
+            result: FloatArray = -(matrix @ whole)[free]
+            return result
+
+        shape = (len(free), len(free))
+        step = np.zeros(force.size)
+        step[free], _ = gmres(
+            LinearOperator(shape, times, dtype=float),
+            -force.ravel()[free],
+            M=LinearOperator(shape, factorisation.solve, dtype=float),
+            rtol=_LINEAR_TOLERANCE,
+            restart=_KRYLOV_VECTORS,
+            maxiter=2,
+        )
+        return step.reshape(force.shape)
+
+    def _bed_stiffness(self, positions: FloatArray) -> FloatArray:
+        """Blocks (b, 3, 3) of the beds."""
+        blocks = np.zeros((self._pattern.block_count, 3, 3))
         for bed in self._beds:
             pressed = bed.points[self._sinking(bed, positions) >= 0.0]  # all of them in A, where the search starts
             local = (bed.stiffness * self._surface.areas[pressed])[:, None, None] * np.outer(bed.normal, bed.normal)
             scatter_blocks(pressed, local, self._surface.shapes, self._pairs, blocks)
-        return self._system.matrix(blocks)
+        return blocks
 
     def _search(self, positions: FloatArray, step: FloatArray, size: float) -> tuple[FloatArray, FloatArray] | None:
         for halving in range(12):

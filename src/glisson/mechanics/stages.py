@@ -1,6 +1,6 @@
 """Takes the body through the stages of a scenario in adaptive load steps."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import degrees, radians
 
 import numpy as np
@@ -24,6 +24,8 @@ _LOAD_STEPS = 4  # for a change of gravity
 _FIRST_SHARE = 0.1  # of a full load step, for the first one: the tool only just comes to bear
 _GROWTH = 2.0
 _STIFFENINGS = 6
+_FIRMER = 2.0
+_ROUGH_TOLERANCE = 1e-2  # while the points that cohere are sought
 _FORCE_ACCURACY = 1e-3
 _LARGEST_ANGLE = radians(90.0)
 
@@ -58,6 +60,8 @@ class StageRunner:
         for number, stage in enumerate(self._scenario.stages):
             self._number = number
             end = self._run_stage(stage)
+            if end.status is Status.CONVERGED:
+                end = self._without_penetration(stage)
             contacts = report_contacts(self._body, self._positions)
             results.append(StageResult(stage.name, self._displacement(), end.status, contacts))
             if end.status is not Status.CONVERGED:
@@ -123,7 +127,7 @@ class StageRunner:
             contact.angle = angle
         body.external, body.law = goal.external, goal.law
         if np.isfinite(body.elasticity.energy(moved)):
-            end = self._without_penetration(self._newton.solve(moved))
+            end = self._equilibrium(moved)
         else:
             end = NewtonEnd(self._positions, Status.INVERTED, 0, float("nan"))
         if end.status is not Status.CONVERGED:
@@ -132,24 +136,44 @@ class StageRunner:
             body.external, body.law = external, law
         return end
 
-    def _without_penetration(self, end: NewtonEnd) -> NewtonEnd:
-        """Stiffen the cushions and solve again as long as a surface point lies inside a tool."""
+    def _equilibrium(self, positions: FloatArray) -> NewtonEnd:
+        """Equilibrium in which exactly the touching points cohere.
+
+        Points that left a tool lose their cohesion between solutions, first rough and at last exact ones, until
+        none has left. Points that newly touch begin to cohere where they are, which needs no force.
+        """
+        body, newton = self._body, self._newton
+        if body.law.cohesion_kpa == 0.0:
+            return newton.solve(positions)
+        end, iterations = newton.solve(positions, _ROUGH_TOLERANCE), 0
+        while True:
+            iterations += end.iterations
+            lost = body.renew_cohesion(end.positions) if end.status is Status.CONVERGED else 0
+            if end.status is not Status.CONVERGED or (lost == 0 and newton.is_exact(end)):
+                return replace(end, iterations=iterations)
+            end = newton.solve(end.positions, _ROUGH_TOLERANCE if lost else None)
+
+    def _without_penetration(self, stage: Stage) -> NewtonEnd:
+        """Stiffen the cushions at the end of a stage as long as a surface point lies inside a tool."""
         body = self._body
+        end = NewtonEnd(self._positions, Status.CONVERGED, 0, 0.0)
         for _ in range(_STIFFENINGS):
+            if not self._stiffen_where_deep():
+                return end
+            end = self._load_step(_Target(tuple(contact.angle for contact in body.contacts), body.external, body.law))
             if end.status is not Status.CONVERGED:
                 return end
-            touches = body.touches(end.positions, update_friction=False)
-            deep = [touch.gaps.size > 0 and float(touch.gaps.min()) <= 0.0 for touch in touches]
-            if not any(deep):
-                return end
-            for contact, is_deep in zip(body.contacts, deep, strict=True):
-                if is_deep:
-                    contact.cushion = contact.cushion.stiffened(2.0)
-            again = self._newton.solve(end.positions)
-            end = NewtonEnd(
-                again.positions, again.status, end.iterations + again.iterations, again.residual, again.reason
-            )
-        return NewtonEnd(end.positions, Status.STAGNATED, end.iterations, end.residual, "a tool stays inside the organ")
+            self._accept(stage, 1.0, end)
+        return replace(end, status=Status.STAGNATED, reason="a tool stays inside the organ")
+
+    def _stiffen_where_deep(self) -> bool:
+        """Make each penetrated cushion firmer; whether there was one."""
+        body, found = self._body, False
+        for contact, touch in zip(body.contacts, body.touches(self._positions, update_friction=False), strict=True):
+            if not contact.tool.yields and touch.gaps.size and float(touch.gaps.min()) <= 0.0:
+                contact.cushion = contact.cushion.stiffened(_FIRMER)
+                found = True
+        return found
 
     def _accept(self, stage: Stage, reach: float, end: NewtonEnd) -> None:
         body = self._body
@@ -174,7 +198,7 @@ class StageRunner:
         assert isinstance(contact.tool, LeverTool)  # the scenario was validated
         wanted = force_mn * contact.tool.lever.length_mm
         end = NewtonEnd(self._positions, Status.CONVERGED, 0, 0.0)
-        turn, slope, missing = self._step, 0.0, wanted - self._moment(number)
+        turn, slope, missing = _FIRST_SHARE * self._step, 0.0, wanted - self._moment(number)
         while missing > _FORCE_ACCURACY * wanted:
             angle = contact.angle
             if angle + turn > _LARGEST_ANGLE:
@@ -189,7 +213,7 @@ class StageRunner:
                 if reached >= -_FORCE_ACCURACY * wanted:
                     slope, missing = (missing - reached) / turn, reached
                     self._accept(stage, 1.0 - missing / wanted, end)
-                    turn = self._step if slope <= 0.0 else min(self._step, max(missing / slope, 1e-6))
+                    turn = min(self._step, _GROWTH * turn, max(missing / slope, 1e-6) if slope > 0.0 else np.inf)
                     continue
                 # Too far: go back, so that friction sees a lever that only ever rises.
                 slope = (missing - reached) / turn
