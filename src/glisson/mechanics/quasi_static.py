@@ -90,7 +90,11 @@ class QuasiStatic:
         stiffest = max(material.young_modulus_kpa for material in model.materials.values())
         slope = max(_CUSHION_STIFFNESS_KPA, _CUSHION_STIFFNESS_MODULI * stiffest) / parameters.contact_range_mm
         cushion = Cushion(parameters.contact_range_mm, slope)
-        contacts = [ToolContact(make_tool(tool), surface, cushion, parameters.stick_mm) for tool in scenario.tools]
+        tools = [make_tool(tool) for tool in scenario.tools]
+        contacts = [
+            ToolContact(tool, surface, replace(cushion, hardening=0.0) if tool.yields else cushion, parameters.stick_mm)
+            for tool in tools
+        ]
         settle_gaps(contacts, surface.positions(mesh.nodes), rest.supports, parameters.surface_tolerance_mm)
         elasticity = Elasticity(mesh, model.materials, rest.positions)
         body = Body(elasticity, surface, contacts, fixed_unknowns(model, scenario.stages[0].fixed))
