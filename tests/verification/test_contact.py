@@ -83,6 +83,41 @@ def test_contact_forces_and_stiffness_are_derivatives() -> None:
     assert np.log10(energy_rest[0] / energy_rest[1]) == pytest.approx(2.0, abs=0.2)
 
 
+def test_friction_that_follows_the_pressure_makes_the_derivative_exact() -> None:
+    """Taylor test of the forces when friction limits are renewed at the moved state."""
+    mesh = box_mesh(SIZES, (3, 3, 2))
+    body = body_of(mesh, BLOCK, boards=[floor(0.05)], stick_mm=0.05)
+    body.law = ContactLaw(0.3, 2.0)
+    rng = np.random.default_rng(2)
+    anchored = mesh.nodes + rng.uniform(-0.003, 0.003, mesh.nodes.shape)
+    body.renew_cohesion(anchored)
+    body.touches(anchored)
+    positions = anchored + [0.02, 0.01, 0.0]
+    touches = body.touches(positions)
+    direction = rng.uniform(-1, 1, mesh.nodes.shape)
+    start = body.balance(positions, touches).unbalanced
+    blocks = body.stiffness(positions, touches, project=False)
+    body.add_friction_by_pressure(positions, touches, blocks)
+    change = body.times(blocks, direction)
+    rest = []
+    for h in (1e-4, 1e-5):
+        moved = positions + h * direction
+        ahead = body.balance(moved, body.touches(moved)).unbalanced
+        rest.append(np.abs(ahead - start + h * change).max())
+    assert np.log10(rest[0] / rest[1]) == pytest.approx(2.0, abs=0.2)
+
+
+@pytest.mark.parametrize("hardening", [0.0, 64.0])
+def test_a_cushion_finds_the_gap_of_a_pressure(hardening: float) -> None:
+    cushion = Cushion(0.1, 360.0, hardening)
+    gaps = np.linspace(-0.05, 0.0999, 40)
+    np.testing.assert_allclose(cushion.gap(cushion.pressure(gaps)), gaps, atol=1e-9)
+    assert cushion.gap(np.zeros(1)) == pytest.approx(0.1)
+    h = 1e-6
+    slope = (cushion.pressure(gaps - h) - cushion.pressure(gaps + h)) / (2 * h)
+    np.testing.assert_allclose(cushion.slope(gaps), slope, rtol=1e-4, atol=1e-2)
+
+
 def _incline(angle_deg: float, law: ContactLaw):
     """A block on a floor, gravity tilted by the angle towards +x; nothing else holds it."""
     mesh = box_mesh(SIZES, (4, 3, 2))
