@@ -54,6 +54,10 @@ def test_run_gives_the_guidance_and_then_skips_everything(case: Path, glisson: G
     stored = json.loads((case / "results/results.json").read_text())
     assert stored["tumour"] == said["tumour"]
     assert (case / "results/report.html").stat().st_size > 10_000
+    # Counted voxels and cut tetrahedra tell the same removed part.
+    parts = read_labels(case / "results/parts.nii.gz")
+    counted = parts.mask("removed").sum() / (parts.voxels > 0).sum()
+    assert counted == pytest.approx(said["volume"]["removed_before"], abs=0.02)
     before = contents(case)
     code, again = glisson("run", case)
     assert code == 0

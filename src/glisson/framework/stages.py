@@ -16,6 +16,7 @@ from glisson.framework.case import (
     GUIDANCE,
     MODEL,
     ORGAN,
+    PARTS,
     REPORT,
     RESULTS,
     SCAN,
@@ -32,13 +33,14 @@ from glisson.framework.provenance import StageRecord, read_record
 from glisson.framework.settings import Settings
 from glisson.framework.stage import Stage
 from glisson.io.deformation_files import read_deformation, write_deformation
-from glisson.io.images import read_volume
+from glisson.io.images import read_labels, read_volume, write_labels
 from glisson.io.model_files import read_model
 from glisson.io.scenario_files import read_scenario
 from glisson.navigation.guidance import navigate
 from glisson.navigation.plan import Plan
 from glisson.navigation.report import ReportInputs, write_report
 from glisson.navigation.results import as_results
+from glisson.navigation.volumes import label_parts
 
 _BEFORE_NAVIGATE = ("segment", "mesh", "scenario", "simulate")
 
@@ -85,8 +87,8 @@ class NavigateStage(Stage):
     """What the surgeon is told."""
 
     name = "navigate"
-    inputs = (MODEL, *DEFORMATION, TRUTH)
-    outputs = (GUIDANCE,)
+    inputs = (ORGAN, MODEL, *DEFORMATION, TRUTH)
+    outputs = (GUIDANCE, PARTS)
     packages = ("glisson.navigation",)
 
     def settings(self, settings: Settings) -> Mapping[str, Any]:
@@ -99,6 +101,10 @@ class NavigateStage(Stage):
         guidance = navigate(read_model(case.path(MODEL)), deformation, plan_of(settings), _truth(case))
         seconds = {name: record.seconds for name, record in _records(case).items() if name in _BEFORE_NAVIGATE}
         results = as_results(guidance, deformation, seconds)
+        planned = guidance.carried or guidance.rule
+        write_labels(
+            out / PARTS, label_parts(read_labels(case.path(ORGAN)), None if planned is None else planned.before)
+        )
         (out / GUIDANCE).write_text(json.dumps(results, indent=1, allow_nan=False) + "\n", encoding="utf-8")
         return results
 

@@ -27,13 +27,14 @@ def removed_fraction(mesh: TetMesh, nodes: FloatArray, plane: Plane) -> float:
     return removed_volume_mm3(mesh, nodes, plane) / organ_volume_mm3(mesh, nodes)
 
 
-def label_parts(organ: LabelMap, plane: Plane) -> LabelMap:
+def label_parts(organ: LabelMap, plane: Plane | None) -> LabelMap:
     """Both parts of the organ in A as voxels on the scan's grid: "remaining" (1) and "removed" (2).
 
-    A voxel belongs to the side that its centre lies on.
+    A voxel belongs to the side that its centre lies on; without a plane all of it remains.
     """
-    inside = np.argwhere(organ.voxels != 0)
-    removed = plane.distance_mm(organ.grid.points_from_indices(inside)) > 0.0
-    voxels = np.zeros(organ.grid.shape, dtype=np.uint8)
-    voxels[tuple(inside.T)] = np.where(removed, REMOVED, REMAINING)
+    voxels = np.where(organ.voxels != 0, REMAINING, 0).astype(np.uint8)
+    if plane is not None:
+        inside = np.argwhere(voxels)
+        removed = inside[plane.distance_mm(organ.grid.points_from_indices(inside)) > 0.0]
+        voxels[tuple(removed.T)] = REMOVED
     return LabelMap(voxels, organ.grid, {REMAINING: "remaining", REMOVED: "removed"})
