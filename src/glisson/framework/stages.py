@@ -102,9 +102,8 @@ class NavigateStage(Stage):
         seconds = {name: record.seconds for name, record in _records(case).items() if name in _BEFORE_NAVIGATE}
         results = as_results(guidance, deformation, seconds)
         planned = guidance.carried or guidance.rule
-        write_labels(
-            out / PARTS, label_parts(read_labels(case.path(ORGAN)), None if planned is None else planned.before)
-        )
+        parts = label_parts(read_labels(case.path(ORGAN)), None if planned is None else planned.before)
+        write_labels(out / PARTS, parts)
         (out / GUIDANCE).write_text(json.dumps(results, indent=1, allow_nan=False) + "\n", encoding="utf-8")
         return results
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
+from scipy.sparse import bsr_matrix, csr_matrix
 
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.scenario import ContactLaw
@@ -132,10 +132,9 @@ class Body:
         """Upper triangle of the free unknowns' matrix."""
         return self.system.matrix(blocks)
 
-    def times(self, blocks: FloatArray, field: FloatArray) -> FloatArray:
-        """The stiffness times a nodal field (n, 3)."""
-        result: FloatArray = _multiply(self._pattern.indptr, self._pattern.indices, blocks, field)
-        return result
+    def matrix(self, blocks: FloatArray) -> bsr_matrix:
+        """The stiffness over all unknowns, for products with nodal fields."""
+        return self._pattern.matrix(blocks)
 
     def tool_motion_forces(
         self, positions: FloatArray, touches: Sequence[Touch], angles: Sequence[float]
@@ -166,15 +165,3 @@ def scatter_blocks(used: IntArray, local: FloatArray, shapes: FloatArray, pairs:
                 for i in range(3):
                     for j in range(3):
                         blocks[slot, i, j] += weight * local[n, i, j]
-
-
-@njit(cache=True)
-def _multiply(indptr: IntArray, indices: IntArray, blocks: FloatArray, field: FloatArray) -> FloatArray:
-    result = np.zeros_like(field)
-    for row in range(len(indptr) - 1):
-        for slot in range(indptr[row], indptr[row + 1]):
-            column = indices[slot]
-            for i in range(3):
-                for j in range(3):
-                    result[row, i] += blocks[slot, i, j] * field[column, j]
-    return result

@@ -119,9 +119,8 @@ class ToolContact:
         """Force of the tool on the organ at every surface point (p, 3), mN."""
         forces = np.zeros_like(points_mm)
         forces[touch.points] = touch.pressures[:, None] * touch.normals
-        slipping, slips, lengths = self._slips(points_mm)
-        shear = self._limits[slipping] * shear_share(lengths, self._stick_mm) / np.maximum(lengths, 1e-300)
-        forces[slipping] -= shear[:, None] * slips
+        slipping, along = self._mobilised(points_mm)
+        forces[slipping] -= self._limits[slipping, None] * along
         world: FloatArray = (forces * self._surface.areas[:, None]) @ touch.rotation.T
         return world
 
@@ -146,10 +145,9 @@ class ToolContact:
 
         With it the linearisation is exact and not symmetric.
         """
-        slipping, slips, lengths = self._slips(points_mm)
-        share = shear_share(lengths, self._stick_mm) / np.maximum(lengths, 1e-300)
         along = np.zeros_like(points_mm)
-        along[slipping] = share[:, None] * slips
+        slipping, mobilised = self._mobilised(points_mm)
+        along[slipping] = mobilised
         used = touch.points
         slope = -law.friction * self.cushion.slope(touch.gaps) * self._surface.areas[used]
         local = slope[:, None, None] * along[used][:, :, None] * touch.normals[:, None, :]
@@ -161,14 +159,14 @@ class ToolContact:
         They guide a body that nothing holds yet: where friction has begun, by its secant, which unlike its
         tangent does not vanish when it slips; elsewhere by a soft glue.
         """
-        near = np.flatnonzero(self.gaps(points_mm) < 2.0 * self.cushion.range_mm)
+        rotation, translation = self.tool.pose(self.angle)
+        distances, normals, _ = self.tool.distance((points_mm - translation) @ rotation)
+        near = np.flatnonzero(distances + self.offsets < 2.0 * self.cushion.range_mm)
         glue = _GLUE_SHARE * self.cushion.stiffness_kpa_mm
         along = np.full(len(self._limits), glue)
         slipping, _, lengths = self._slips(points_mm)
         along[slipping] = self._limits[slipping] / np.maximum(lengths, self._stick_mm)
-        rotation, translation = self.tool.pose(self.angle)
-        _, normals, _ = self.tool.distance((points_mm[near] - translation) @ rotation)
-        normals = normals @ rotation.T
+        normals = normals[near] @ rotation.T
         outer = normals[:, :, None] * normals[:, None, :]
         held = glue * outer + along[near, None, None] * (np.eye(3) - outer)
         return near, self._surface.areas[near, None, None] * held
@@ -207,6 +205,11 @@ class ToolContact:
         normals = self._lagged_normals[points]
         slips = away - np.einsum("pi,pi->p", away, normals)[:, None] * normals
         return points, slips, np.linalg.norm(slips, axis=1)
+
+    def _mobilised(self, points_mm: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Points with friction, and the slip's direction times the share of the limit that is mobilised."""
+        slipping, slips, lengths = self._slips(points_mm)
+        return slipping, (shear_share(lengths, self._stick_mm) / np.maximum(lengths, 1e-300))[:, None] * slips
 
     def _friction_blocks(self, points: IntArray, slips: FloatArray, lengths: FloatArray) -> FloatArray:
         normals = self._lagged_normals[points]

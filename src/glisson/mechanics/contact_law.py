@@ -2,8 +2,8 @@
 
 Normal direction: the pressure is zero at gaps over `range_mm`, rises as the square of the depth, and much
 faster from half the range on. The range is a cushion: soft where the pressure is that of an organ's weight,
-which saves two thirds of the iterations, and hard where an edge presses, so that all gaps are positive at
-the end of a stage (else the solver stiffens the cushion). Unlike a logarithmic barrier it is finite
+which saves iterations, and hard where an edge presses, so that all gaps are positive at the end of a stage
+(else the solver stiffens the cushion). Unlike a logarithmic barrier it is finite
 everywhere: a tool may move millimetres in one step, and Newton's method pulls the organ after it.
 
 Tangential direction: |τ| ≤ friction · p, and cohesion more where the surface coheres: cohesion is shear
@@ -69,7 +69,7 @@ class Cushion:
         return depth, np.maximum(depth - 0.5, 0.0)
 
     def stiffened(self, factor: float) -> "Cushion":
-        """The same range with another slope."""
+        """The same range with pressures `factor` times as high."""
         return replace(self, stiffness_kpa_mm=self.stiffness_kpa_mm * factor)
 
 

@@ -50,15 +50,15 @@ def find_free_motion(body: Body, positions: FloatArray) -> FreeMotion | None:
         return None
     touches = body.touches(positions, update_friction=False)
     blocks = body.stiffness(positions, touches, project=True)
-    modes = _rigid_modes(positions)
-    stiffness = np.array([[float(np.vdot(a, body.times(blocks, b))) for b in modes] for a in modes])
+    modes = np.reshape(_rigid_modes(positions), (6, -1))
+    stiffness = modes @ (body.matrix(blocks) @ modes.T)
     values, vectors = np.linalg.eigh(0.5 * (stiffness + stiffness.T))
     scale = float(np.abs(np.einsum("bii->b", blocks)).mean()) * len(positions)
     free = values < _HELD_SHARE * scale
     if not free.any():
         return None
     unbalanced = body.balance(positions, touches).unbalanced
-    push = np.array([float(np.vdot(mode, unbalanced)) for mode in modes])
+    push = modes @ unbalanced.ravel()
     motion = vectors[:, free] @ (vectors[:, free].T @ push)
     if not np.any(motion):
         motion = vectors[:, 0]

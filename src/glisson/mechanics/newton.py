@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_matrix
-from scipy.sparse.linalg import LinearOperator, gmres
 
 from glisson.core.arrays import FloatArray
 from glisson.core.status import Status
@@ -13,15 +12,14 @@ from glisson.mechanics.body import Balance, Body
 from glisson.mechanics.contact import Touch
 from glisson.mechanics.free_motion import find_free_motion
 from glisson.mechanics.linear_solvers import Factorisation
+from glisson.mechanics.unsymmetric import solve_near_symmetric
 
 _ARMIJO = 1e-4
 _HALVINGS = 40
 _ROUND_OFF = 1e-13  # share of the energy that may be lost to rounding in a difference of energies
 _LONGEST_STEP = 0.05  # of the body's diagonal, for any node in one iteration
-_COUPLED_RESIDUAL = 1e-2
-_COUPLED_ACCURACY = 1e-3
-_COUPLED_GAIN = 0.3
-_KRYLOV_VECTORS = 20
+_COUPLED_RESIDUAL = 1e-2  # below it friction that follows the pressure is worth its price
+_COUPLED_GAIN = 0.3  # what such a step must make of the residual to be taken
 _LOOSE_STEPS = 8  # steps in a row of a body that nothing holds, before its free motion is looked for
 
 
@@ -48,7 +46,7 @@ class NewtonEnd:
 class _Direction:
     """A step (n, 3) in mm, and whether the body was held without glue and without a limit on the step.
 
-    `blocks` (b, 3, 3) is the stiffness whose factor is at hand, where it is that of a held body.
+    `blocks` (b, 3, 3) is the exact stiffness, where it is the one whose factor is at hand.
     """
 
     step: FloatArray
@@ -130,7 +128,7 @@ class Newton:
             if direction is not None:
                 break
         if direction is not None and self._allowed_share(direction) == 1.0:
-            return _Direction(direction, held=True, blocks=blocks)
+            return _Direction(direction, held=True, blocks=None if project else blocks)
         body.add_bonds(positions, blocks)
         upper = body.upper(blocks)
         glued = self._solved(upper, forces)
@@ -152,32 +150,15 @@ class Newton:
         """Near the end, the exact step, in which friction follows the pressure; None where it does not pay.
 
         Without it the iteration converges only linearly. The matrix is not symmetric and friction has no
-        energy: GMRES with the symmetric factor solves, and the residual judges.
+        energy: the residual judges. The direction's blocks are used up.
         """
         body = self._body
         if direction.blocks is None or balance.residual > _COUPLED_RESIDUAL or body.law.friction == 0.0:
             return None
-        blocks, free = direction.blocks.copy(), body.system.free
+        blocks = direction.blocks
         body.add_friction_by_pressure(positions, touches, blocks)
-        whole = np.zeros(positions.size)
-
-        def times(values: FloatArray) -> FloatArray:
-            whole[free] = values
-            result: FloatArray = body.times(blocks, whole.reshape(positions.shape)).ravel()[free]
-            return result
-
-        shape = (len(free), len(free))
-        step = np.zeros(positions.size)
-        step[free], _ = gmres(
-            LinearOperator(shape, times, dtype=float),
-            balance.unbalanced.ravel()[free],
-            x0=direction.step.ravel()[free],
-            M=LinearOperator(shape, self._factorisation.solve, dtype=float),
-            rtol=_COUPLED_ACCURACY,
-            restart=_KRYLOV_VECTORS,
-            maxiter=1,
-        )
-        moved = positions + step.reshape(positions.shape)
+        matrix, free = body.matrix(blocks), body.system.free
+        moved = positions + solve_near_symmetric(matrix, free, self._factorisation, balance.unbalanced)
         if not np.isfinite(body.elasticity.energy(moved)):
             return None
         found = body.balance(moved, body.touches(moved))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse import bsr_matrix, coo_matrix, csr_matrix
 
 from glisson.core.arrays import FloatArray, IntArray
 
@@ -26,6 +26,10 @@ class BlockPattern:
     def block_count(self) -> int:
         """Number of 3 × 3 blocks."""
         return len(self.indices)
+
+    def matrix(self, blocks: FloatArray) -> bsr_matrix:
+        """The matrix of block values (b, 3, 3), over all unknowns."""
+        return bsr_matrix((blocks, self.indices, self.indptr))
 
 
 def block_pattern(tetrahedra: IntArray, node_count: int) -> BlockPattern:

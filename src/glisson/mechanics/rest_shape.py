@@ -12,8 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_matrix
-from scipy.sparse.linalg import LinearOperator, gmres
 
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.errors import StageFailed
@@ -26,11 +24,10 @@ from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.elements import SurfaceQuadrature, quadrature
 from glisson.mechanics.linear_solvers import Factorisation, make_factorisation
 from glisson.mechanics.pattern import FreeSystem, block_pattern, pair_slots
+from glisson.mechanics.unsymmetric import solve_near_symmetric
 
 _TOLERANCE = 1e-8
 _ITERATION_LIMIT = 60
-_LINEAR_TOLERANCE = 1e-3
-_KRYLOV_VECTORS = 40
 _WEIGHT_SHARES = (0.25, 0.5, 0.75, 1.0)
 _BED_STIFFNESS_SHARE = 10.0  # bed stiffness in Young's moduli per mm: a weight of 0.6 kPa sinks in by 0.01 mm
 _FACING = -0.5  # a surface point lies on a board when its outward normal is turned this much towards it
@@ -89,7 +86,7 @@ def find_rest_shape(
 class _InverseProblem:
     """Residual, derivative and search for X.
 
-    The derivative is not symmetric; the forward stiffness at (X, A), which is near it, preconditions GMRES.
+    The derivative is not symmetric; the forward stiffness at (X, A), which is near it, preconditions.
     """
 
     def __init__(
@@ -173,25 +170,7 @@ class _InverseProblem:
         if not factorisation.factor(self._system.matrix(stiffness)):
             return None
         elasticity.add_rest_derivative(self._mesh.nodes, self._pattern, derivative)
-        matrix = bsr_matrix((derivative, self._pattern.indices, self._pattern.indptr))
-        free, whole = self._system.free, np.zeros(force.size)
-
-        def times(values: FloatArray) -> FloatArray:
-            whole[free] = values
-            result: FloatArray = -(matrix @ whole)[free]
-            return result
-
-        shape = (len(free), len(free))
-        step = np.zeros(force.size)
-        step[free], _ = gmres(
-            LinearOperator(shape, times, dtype=float),
-            -force.ravel()[free],
-            M=LinearOperator(shape, factorisation.solve, dtype=float),
-            rtol=_LINEAR_TOLERANCE,
-            restart=_KRYLOV_VECTORS,
-            maxiter=2,
-        )
-        return step.reshape(force.shape)
+        return solve_near_symmetric(self._pattern.matrix(-derivative), self._system.free, factorisation, -force)
 
     def _bed_stiffness(self, positions: FloatArray) -> FloatArray:
         """Blocks (b, 3, 3) of the beds."""

@@ -14,6 +14,7 @@ from glisson.core.scenario import ContactLaw, Scenario, Stage
 from glisson.core.status import Status
 from glisson.core.units import STANDARD_GRAVITY_MM_S2, density_from_kg_m3, millinewtons_from_newtons
 from glisson.mechanics.body import Body
+from glisson.mechanics.contact import ToolContact
 from glisson.mechanics.contact_report import hinge_moment, report_contacts
 from glisson.mechanics.elements import nodal_volumes
 from glisson.mechanics.newton import Newton, NewtonEnd
@@ -156,24 +157,25 @@ class StageRunner:
     def _without_penetration(self, stage: Stage) -> NewtonEnd:
         """Stiffen the cushions at the end of a stage as long as a surface point lies inside a tool."""
         body = self._body
-        end = NewtonEnd(self._positions, Status.CONVERGED, 0, 0.0)
+        end, penetrated = NewtonEnd(self._positions, Status.CONVERGED, 0, 0.0), self._penetrated()
         for _ in range(_STIFFENINGS):
-            if not self._stiffen_where_deep():
-                return end
+            if not penetrated:
+                break
+            for contact in penetrated:
+                contact.cushion = contact.cushion.stiffened(_FIRMER)
             end = self._load_step(_Target(tuple(contact.angle for contact in body.contacts), body.external, body.law))
             if end.status is not Status.CONVERGED:
                 return end
             self._accept(stage, 1.0, end)
-        return replace(end, status=Status.STAGNATED, reason="a tool stays inside the organ")
+            penetrated = self._penetrated()
+        if penetrated:
+            return replace(end, status=Status.STAGNATED, reason="a tool stays inside the organ")
+        return end
 
-    def _stiffen_where_deep(self) -> bool:
-        """Make each penetrated cushion firmer; whether there was one."""
-        body, found = self._body, False
-        for contact, touch in zip(body.contacts, body.touches(self._positions, update_friction=False), strict=True):
-            if not contact.tool.yields and touch.gaps.size and float(touch.gaps.min()) <= 0.0:
-                contact.cushion = contact.cushion.stiffened(_FIRMER)
-                found = True
-        return found
+    def _penetrated(self) -> list[ToolContact]:
+        """Tools, other than yielding ones, inside which a surface point lies."""
+        points = self._body.surface.positions(self._positions)
+        return [c for c in self._body.contacts if not c.tool.yields and float(c.gaps(points).min()) <= 0.0]
 
     def _accept(self, stage: Stage, reach: float, end: NewtonEnd) -> None:
         body = self._body
