@@ -4,44 +4,15 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from bodies import box_mesh, box_model
+from lifts import BOARD, DOWN, WIDE, lift, slab, slab_lever
 
-from glisson.core import BadInput, Board, ContactLaw, Lever, LeverDrive, Material, Scenario, Stage, Status
+from glisson.core import BadInput, ContactLaw, Lever, LeverDrive, Scenario, Stage, Status
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
-
-DOWN = np.array([0.0, 0.0, -1.0])
-BOARD = Board("board", np.zeros(3), -DOWN)
-SIZES = (120.0, 50.0, 25.0)
-
-
-def _lever(height: float = 0.0, length_mm: float = 70.0) -> Lever:
-    arm = np.array([1.0, 0.0, 0.0])
-    return Lever.lifting("lever", np.array([55.0, 20.0, height]), arm, -DOWN, length_mm=length_mm)
-
-
-# Wide and centred: a narrow one lets the slab roll to either side, two states a hair apart.
-WIDE = Lever.lifting("lever", np.array([55.0, 25.0, 0.0]), np.array([1.0, 0, 0]), -DOWN, length_mm=70.0, width_mm=60.0)
-
-
-def _slab(young_modulus_kpa: float, counts=(8, 3, 2), poisson_ratio=0.45):
-    mesh = box_mesh(SIZES, counts)
-    back = np.flatnonzero(mesh.nodes[:, 0] < 1e-9)
-    return box_model(mesh, Material("neo-hookean", young_modulus_kpa, poisson_ratio), back=back)
-
-
-def _lift(model, drive: LeverDrive, lever: Lever | None = None, cohesion_kpa=10.0, **parameters):
-    """Sticky while the lever rises, plain friction afterwards (the second stage of the dissertation)."""
-    stages = (
-        Stage("stage 1", ContactLaw(0.1, cohesion_kpa), (drive,)),
-        Stage("stage 2", ContactLaw(0.1)),
-    )
-    scenario = Scenario((BOARD, lever or _lever()), stages, DOWN, DOWN, ("board",))
-    return QuasiStatic(QuasiStaticParameters(**parameters)).solve(model, scenario)
 
 
 @pytest.mark.parametrize("young_modulus_kpa", [700.0, 70.0, 12.0, 6.0, 3.0])
 def test_the_lift_converges_from_stiff_to_soft(young_modulus_kpa: float) -> None:
-    answer = _lift(_slab(young_modulus_kpa), LeverDrive("lever", angle_deg=20.0), WIDE)
+    answer = lift(slab(young_modulus_kpa), LeverDrive("lever", angle_deg=20.0), WIDE)
     assert answer.status is Status.CONVERGED, answer.message
     assert all(step.residual <= 1e-6 for step in answer.record if step.status is Status.CONVERGED)
     for stage in answer.stages:
@@ -55,12 +26,12 @@ def test_the_lift_converges_from_stiff_to_soft(young_modulus_kpa: float) -> None
 
 def test_force_and_angle_drives_agree() -> None:
     """The hinge moment at an angle, applied as a force on the lever's end, finds the angle again."""
-    model = _slab(7.0, (6, 2, 2))
-    by_angle = _lift(model, LeverDrive("lever", angle_deg=8.0), cohesion_kpa=0.0)
+    model = slab(7.0, (6, 2, 2))
+    by_angle = lift(model, LeverDrive("lever", angle_deg=8.0), cohesion_kpa=0.0)
     report = next(r for r in by_angle.stages[0].contacts if r.tool == "lever")
     assert report.hinge_moment_nm is not None
     force = report.hinge_moment_nm / 0.070
-    by_force = _lift(model, LeverDrive("lever", force_n=force), cohesion_kpa=0.0)
+    by_force = lift(model, LeverDrive("lever", force_n=force), cohesion_kpa=0.0)
     assert by_force.status is Status.CONVERGED
     found = next(r for r in by_force.stages[0].contacts if r.tool == "lever")
     assert found.hinge_moment_nm == pytest.approx(report.hinge_moment_nm, rel=2e-3)
@@ -71,7 +42,7 @@ def test_refinement_converges() -> None:
     """Three meshes: a material point's lift settles, each refinement changing it less."""
     lifts = []
     for counts in ((4, 2, 1), (8, 4, 2), (16, 6, 4)):
-        answer = _lift(_slab(7.0, counts), LeverDrive("lever", angle_deg=10.0), WIDE, cohesion_kpa=0.0)
+        answer = lift(slab(7.0, counts), LeverDrive("lever", angle_deg=10.0), WIDE, cohesion_kpa=0.0)
         assert answer.status is Status.CONVERGED
         point = np.linalg.norm(answer.mesh.nodes - [90.0, 25.0, 25.0], axis=1).argmin()
         lifts.append(answer.stages[-1].displacement[point])
@@ -82,17 +53,17 @@ def test_refinement_converges() -> None:
 
 def test_a_lever_that_misses_is_told() -> None:
     lever = Lever.lifting("lever", np.array([200.0, 20.0, 0.0]), np.array([1.0, 0, 0]), -DOWN)
-    answer = _lift(_slab(7.0, (6, 2, 2)), LeverDrive("lever", angle_deg=10.0), lever)
+    answer = lift(slab(7.0, (6, 2, 2)), LeverDrive("lever", angle_deg=10.0), lever)
     assert answer.status is Status.BAD_INPUT
     assert "never touched the organ" in answer.message
 
 
 def test_a_lever_inside_the_organ_is_refused() -> None:
     with pytest.raises(BadInput, match=r"cuts .* mm into the organ"):
-        _lift(_slab(7.0, (6, 2, 2)), LeverDrive("lever", angle_deg=10.0), _lever(height=10.0))
+        lift(slab(7.0, (6, 2, 2)), LeverDrive("lever", angle_deg=10.0), slab_lever(height=10.0))
 
 
 def test_an_unknown_attachment_is_refused() -> None:
     stages = (Stage("stage 1", ContactLaw(), fixed=("front",)),)
     with pytest.raises(BadInput, match=r"no node set 'front'"):
-        QuasiStatic(QuasiStaticParameters()).solve(_slab(7.0, (2, 1, 1)), Scenario((BOARD,), stages, DOWN, DOWN))
+        QuasiStatic(QuasiStaticParameters()).solve(slab(7.0, (2, 1, 1)), Scenario((BOARD,), stages, DOWN, DOWN))
