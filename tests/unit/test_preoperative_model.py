@@ -24,7 +24,7 @@ TUMOUR_MM = np.array([-35.0, 0.0, 5.0])
 def built():
     organ = labels_of("liver", two_lobes, LIVER_GRID)
     tumours = labels_of("tumour1", ellipsoid(tuple(TUMOUR_MM), (14.0, 14.0, 14.0)), LIVER_GRID)
-    mesher = FTetWild(FTetWildParameters(edge_length_mm=20.0, envelope_mm=0.6))
+    mesher = FTetWild(FTetWildParameters(edge_length_mm=12.0, envelope_mm=0.6))
     extractor = MarchingCubes(MarchingCubesParameters(edge_length_mm=5.0))
     return organ, build_model(organ, tumours, None, extractor, mesher, ModelSettings())
 

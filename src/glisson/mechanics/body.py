@@ -1,6 +1,6 @@
 """The whole mechanical system at one instant: elastic body, tools, dead loads, held unknowns."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,14 +20,47 @@ from glisson.mechanics.pattern import FreeSystem, block_pattern, pair_slots
 class Balance:
     """Forces on the nodes (n, 3) in mN; in equilibrium their sum vanishes on the free unknowns.
 
-    `residual` is the norm of that sum divided by the largest of the three norms (0 without any load).
+    `scale` in mN is the largest of the three norms, `residual` the norm of the sum divided by it (0 without any load).
     """
 
     internal: FloatArray
     contact: FloatArray
     external: FloatArray
+    scale: float
     residual: float
     unbalanced: FloatArray
+
+
+@dataclass(frozen=True)
+class ToolState:
+    """Angles of tools in rad, and the contact law."""
+
+    angles: tuple[float, ...]
+    law: ContactLaw
+
+    def of(self, tools: Iterable[int]) -> "ToolState":
+        """The state of some of the tools."""
+        return ToolState(tuple(self.angles[number] for number in tools), self.law)
+
+    def towards(self, goal: "ToolState", share: float) -> "ToolState":
+        """A state on the straight way to another one."""
+        angles = tuple(a + share * (b - a) for a, b in zip(self.angles, goal.angles, strict=True))
+        friction = self.law.friction + share * (goal.law.friction - self.law.friction)
+        cohesion = self.law.cohesion_kpa + share * (goal.law.cohesion_kpa - self.law.cohesion_kpa)
+        return ToolState(angles, ContactLaw(friction, cohesion))
+
+
+@dataclass(frozen=True, eq=False)
+class LoadState:
+    """What is done to the organ: the tools, and dead loads (n, 3) in mN."""
+
+    tools: ToolState
+    external: FloatArray
+
+    def towards(self, goal: "LoadState", share: float) -> "LoadState":
+        """A state on the straight way to another one."""
+        external = self.external + share * (goal.external - self.external)
+        return LoadState(self.tools.towards(goal.tools, share), external)
 
 
 class Body:
@@ -50,6 +83,8 @@ class Body:
         self.elasticity = elasticity
         self.surface = surface
         self.contacts = tuple(contacts)
+        self.moving = tuple(n for n, contact in enumerate(self.contacts) if contact.tool.moves)
+        self.standing = tuple(n for n in range(len(self.contacts)) if n not in self.moving)
         self.external = np.zeros_like(elasticity.rest)
         self.law = ContactLaw()
         self._pattern = block_pattern(elasticity.mesh.tetrahedra, len(elasticity.rest))
@@ -60,6 +95,18 @@ class Body:
         """Change which unknowns (n, 3) are held."""
         self.fixed = fixed
         self.system = FreeSystem(self._pattern, fixed.ravel())
+
+    @property
+    def loading(self) -> LoadState:
+        """The present tools and loads."""
+        angles = tuple(contact.angle for contact in self.contacts)
+        return LoadState(ToolState(angles, self.law), self.external)
+
+    @loading.setter
+    def loading(self, state: LoadState) -> None:
+        for contact, angle in zip(self.contacts, state.tools.angles, strict=True):
+            contact.angle = angle
+        self.law, self.external = state.tools.law, state.external
 
     def touches(self, positions: FloatArray, update_friction: bool = True) -> tuple[Touch, ...]:
         """Where each tool touches; friction limits follow the present pressure unless told not to."""
@@ -91,26 +138,35 @@ class Body:
 
     def balance(self, positions: FloatArray, touches: Sequence[Touch]) -> Balance:
         """All nodal forces and what is left of them on the free unknowns."""
-        points = self.surface.positions(positions)
         internal = -self.elasticity.forces(positions)
-        pushes = np.zeros_like(points)
-        for contact, touch in zip(self.contacts, touches, strict=True):
-            pushes += contact.forces(touch, points)
-        contact_forces = self.surface.scatter(pushes, len(positions))
+        contact_forces = self.contact_forces(positions, touches, range(len(self.contacts)))
         unbalanced = internal + contact_forces + self.external
         unbalanced[self.fixed] = 0.0
         largest = max(float(np.linalg.norm(part)) for part in (internal, contact_forces, self.external))
         size = float(np.linalg.norm(unbalanced))
         residual = size / largest if largest > 0.0 else 0.0
-        return Balance(internal, contact_forces, self.external, residual, unbalanced)
+        return Balance(internal, contact_forces, self.external, largest, residual, unbalanced)
 
-    def stiffness(self, positions: FloatArray, touches: Sequence[Touch], project: bool) -> FloatArray:
-        """Blocks (b, 3, 3) of ∂²Π/∂x²; `project` makes them positive semi-definite."""
+    def contact_forces(self, positions: FloatArray, touches: Sequence[Touch], tools: Iterable[int]) -> FloatArray:
+        """Nodal forces (n, 3) in mN of the tools of the given numbers."""
+        points = self.surface.positions(positions)
+        pushes = np.zeros_like(points)
+        for number in tools:
+            pushes += self.contacts[number].forces(touches[number], points)
+        return self.surface.scatter(pushes, len(positions))
+
+    def stiffness(
+        self, positions: FloatArray, touches: Sequence[Touch], project: bool, tools: Iterable[int] | None = None
+    ) -> FloatArray:
+        """Blocks (b, 3, 3) of ∂²Π/∂x², with all tools or those of the given numbers.
+
+        `project` makes them positive semi-definite.
+        """
         blocks = np.zeros((self._pattern.block_count, 3, 3))
         self.elasticity.add_stiffness(positions, self._pattern, blocks, project)
         points = self.surface.positions(positions)
-        for contact, touch in zip(self.contacts, touches, strict=True):
-            used, local = contact.stiffness(touch, points, project)
+        for number in range(len(self.contacts)) if tools is None else tools:
+            used, local = self.contacts[number].stiffness(touches[number], points, project)
             scatter_blocks(used, local, self.surface.shapes, self._pairs, blocks)
         return blocks
 
@@ -135,21 +191,6 @@ class Body:
     def matrix(self, blocks: FloatArray) -> bsr_matrix:
         """The stiffness over all unknowns, for products with nodal fields."""
         return self._pattern.matrix(blocks)
-
-    def tool_motion_forces(
-        self, positions: FloatArray, touches: Sequence[Touch], angles: Sequence[float]
-    ) -> FloatArray:
-        """Nodal forces (n, 3) that tools turning to `angles` exert to first order on an organ held still."""
-        points = self.surface.positions(positions)
-        pushes = np.zeros_like(points)
-        for contact, touch, angle in zip(self.contacts, touches, angles, strict=True):
-            if angle == contact.angle:
-                continue
-            used, local = contact.stiffness(touch, points, project=True)
-            pushes[used] += np.einsum("pij,pj->pi", local, contact.motion(used, points, angle))
-        forces = self.surface.scatter(pushes, len(positions))
-        forces[self.fixed] = 0.0
-        return forces
 
 
 @njit(cache=True)

@@ -1,6 +1,6 @@
 """Contact of the organ's surface with one rigid tool, integrated at surface quadrature points."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,32 +33,61 @@ class Touch:
     rotation: FloatArray
 
 
-class ToolContact:
-    """One tool, with what must be remembered from step to step: anchors and surface offsets.
+@dataclass(eq=False)
+class PointStates:
+    """What a tool remembers of every surface point from step to step.
 
-    `offsets` (p,) correct the scanned surface, known to about a voxel only, onto the tool; see
-    `rest_shape`. Friction uses the pressures and normals of the last call of `update_friction`.
+    `offsets` (p,) correct the scanned surface, known to about a voxel only, onto the tool (see `settle_gaps`);
+    `anchors` (p, 3), in the tool's frame, are where points stick; `anchored` and `cohering` (p,) say which do.
+    Shear limits (p,) in kPa and normals (p, 3) are those of the last call of `update_friction`.
     """
+
+    offsets: FloatArray
+    anchors: FloatArray
+    anchored: NDArray[np.bool_]
+    cohering: NDArray[np.bool_]
+    limits: FloatArray
+    normals: FloatArray
+
+    @classmethod
+    def of(cls, count: int) -> "PointStates":
+        """Points that never touched."""
+        none = np.zeros(count, dtype=bool)
+        return cls(np.zeros(count), np.zeros((count, 3)), none, none.copy(), np.zeros(count), np.zeros((count, 3)))
+
+    def take(self, points: IntArray | slice = slice(None)) -> "PointStates":
+        """A copy, of all points or of some."""
+        return PointStates(*(np.array(getattr(self, field.name)[points]) for field in fields(self)))
+
+    def put(self, points: IntArray, states: "PointStates") -> None:
+        """Overwrite some points."""
+        for field in fields(self):
+            getattr(self, field.name)[points] = getattr(states, field.name)
+
+
+class ToolContact:
+    """One tool at one angle (rad), and what it remembers of the organ's surface points."""
 
     def __init__(self, tool: RigidTool, surface: SurfaceQuadrature, cushion: Cushion, stick_mm: float) -> None:
         count = len(surface.areas)
         self.tool = tool
         self.cushion = cushion
         self.angle = 0.0
-        self.offsets = np.zeros(count)
-        self.anchors = np.zeros((count, 3))
-        self.anchored = np.zeros(count, dtype=bool)
+        self.states = PointStates.of(count)
         self._surface = surface
         self._stick_mm = stick_mm
-        self._cohering = np.zeros(count, dtype=bool)
-        self._limits = np.zeros(count)
-        self._lagged_normals = np.zeros((count, 3))
+
+    def part(self, points: IntArray) -> "ToolContact":
+        """The same tool over some of the surface points, with a copy of their states."""
+        part = ToolContact(self.tool, self._surface.part(points), self.cushion, self._stick_mm)
+        part.angle, part.states = self.angle, self.states.take(points)
+        return part
 
     def gaps(self, points_mm: FloatArray) -> FloatArray:
         """Gap (p,) of all surface points (p, 3), offsets included."""
         rotation, translation = self.tool.pose(self.angle)
         distances, _, _ = self.tool.distance((points_mm - translation) @ rotation)
-        gaps: FloatArray = distances + self.offsets
+        gaps: FloatArray = distances + self.states.offsets
         return gaps
 
     def touch(self, points_mm: FloatArray) -> Touch:
@@ -66,45 +95,45 @@ class ToolContact:
         rotation, translation = self.tool.pose(self.angle)
         local = (points_mm - translation) @ rotation
         distances, normals, curvatures = self.tool.distance(local)
-        gaps = distances + self.offsets
+        gaps = distances + self.states.offsets
         near = np.flatnonzero(gaps < self.cushion.range_mm)
         pressures = self.cushion.pressure(gaps[near])
         return Touch(near, local[near], gaps[near], pressures, normals[near], curvatures[near], rotation)
 
     def renew_cohesion(self, touch: Touch) -> int:
         """Let exactly the touching points cohere; how many of those that did had left the tool."""
-        touching = np.zeros_like(self._cohering)
+        touching = np.zeros_like(self.states.cohering)
         touching[touch.points] = True
-        left = int((self._cohering & ~touching).sum())
-        self._cohering = touching
+        left = int((self.states.cohering & ~touching).sum())
+        self.states.cohering = touching
         return left
 
     def add_cohesion(self, touch: Touch) -> None:
         """Let points that newly touch cohere at once."""
-        self._cohering[touch.points] = True
+        self.states.cohering[touch.points] = True
 
     def update_friction(self, touch: Touch, law: ContactLaw) -> None:
         """Take shear limits and normals from the present state; anchor the points that newly touch.
 
         A point that left the tool loses its anchor, unless cohesion still acts on it in this pass.
         """
-        touching = self._cohering.copy()
+        touching = self.states.cohering.copy()
         touching[touch.points] = True
         pressures = np.zeros(len(touching))
         pressures[touch.points] = touch.pressures
-        local = np.zeros_like(self.anchors)
+        local = np.zeros_like(self.states.anchors)
         local[touch.points] = touch.local
-        new = touching & ~self.anchored
-        self.anchors[new] = local[new]
-        self.anchored = touching
-        self._limits = shear_limit(pressures, self._cohering, law)
-        self._lagged_normals[touch.points] = touch.normals
+        new = touching & ~self.states.anchored
+        self.states.anchors[new] = local[new]
+        self.states.anchored = touching
+        self.states.limits = shear_limit(pressures, self.states.cohering, law)
+        self.states.normals[touch.points] = touch.normals
 
     def drag_anchors(self, points_mm: FloatArray) -> None:
         """Return mapping after a converged step: anchors follow what slipped further than sticking allows."""
         slipping, slips, lengths = self._slips(points_mm)
         excess = np.maximum(1.0 - self._stick_mm / np.maximum(lengths, 1e-300), 0.0)
-        self.anchors[slipping] += excess[:, None] * slips
+        self.states.anchors[slipping] += excess[:, None] * slips
 
     def energy(self, points_mm: FloatArray) -> float:
         """Cushion and friction energy in µJ."""
@@ -113,14 +142,14 @@ class ToolContact:
         near = np.flatnonzero(gaps < self.cushion.range_mm)
         normal = float(areas[near] @ self.cushion.energy(gaps[near]))
         slipping, _, lengths = self._slips(points_mm)
-        return normal + float((areas * self._limits)[slipping] @ slip_energy(lengths, self._stick_mm))
+        return normal + float((areas * self.states.limits)[slipping] @ slip_energy(lengths, self._stick_mm))
 
     def forces(self, touch: Touch, points_mm: FloatArray) -> FloatArray:
         """Force of the tool on the organ at every surface point (p, 3), mN."""
         forces = np.zeros_like(points_mm)
         forces[touch.points] = touch.pressures[:, None] * touch.normals
         slipping, along = self._mobilised(points_mm)
-        forces[slipping] -= self._limits[slipping, None] * along
+        forces[slipping] -= self.states.limits[slipping, None] * along
         world: FloatArray = (forces * self._surface.areas[:, None]) @ touch.rotation.T
         return world
 
@@ -161,11 +190,11 @@ class ToolContact:
         """
         rotation, translation = self.tool.pose(self.angle)
         distances, normals, _ = self.tool.distance((points_mm - translation) @ rotation)
-        near = np.flatnonzero(distances + self.offsets < 2.0 * self.cushion.range_mm)
+        near = np.flatnonzero(distances + self.states.offsets < 2.0 * self.cushion.range_mm)
         glue = _GLUE_SHARE * self.cushion.stiffness_kpa_mm
-        along = np.full(len(self._limits), glue)
+        along = np.full(len(self.states.limits), glue)
         slipping, _, lengths = self._slips(points_mm)
-        along[slipping] = self._limits[slipping] / np.maximum(lengths, self._stick_mm)
+        along[slipping] = self.states.limits[slipping] / np.maximum(lengths, self._stick_mm)
         normals = normals[near] @ rotation.T
         outer = normals[:, :, None] * normals[:, None, :]
         held = glue * outer + along[near, None, None] * (np.eye(3) - outer)
@@ -181,28 +210,27 @@ class ToolContact:
             return 0.0, 0.0
         return float(area[lengths < self._stick_mm].sum() / area.sum()), float(lengths.max())
 
-    def motion(self, points: IntArray, points_mm: FloatArray, angle: float) -> FloatArray:
-        """How far the tool's material under the given points moves (k, 3) when it turns to `angle`."""
+    def motion(self, points_mm: FloatArray, angle: float) -> FloatArray:
+        """How far the tool's material under the points (p, 3) moves (p, 3) when it turns to `angle`."""
         rotation, translation = self.tool.pose(self.angle)
-        local = (points_mm[points] - translation) @ rotation
         turned, shifted = self.tool.pose(angle)
-        return local @ turned.T + shifted - points_mm[points]
+        return (points_mm - translation) @ rotation @ turned.T + shifted - points_mm
 
-    def memory(self) -> tuple[float, FloatArray, NDArray[np.bool_]]:
+    def memory(self) -> tuple[float, PointStates]:
         """What a rejected step must put back."""
-        return self.angle, self.anchors.copy(), self.anchored.copy()
+        return self.angle, self.states.take()
 
-    def recall(self, memory: tuple[float, FloatArray, NDArray[np.bool_]]) -> None:
+    def recall(self, memory: tuple[float, PointStates]) -> None:
         """Put back what `memory` returned."""
-        self.angle, anchors, anchored = memory
-        self.anchors, self.anchored = anchors.copy(), anchored.copy()
+        self.angle, states = memory
+        self.states = states.take()
 
     def _slips(self, points_mm: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
         """Points with friction, their tangential slip from the anchor in the tool frame, and its length."""
-        points = np.flatnonzero(self._limits > 0.0)
+        points = np.flatnonzero(self.states.limits > 0.0)
         rotation, translation = self.tool.pose(self.angle)
-        away = (points_mm[points] - translation) @ rotation - self.anchors[points]
-        normals = self._lagged_normals[points]
+        away = (points_mm[points] - translation) @ rotation - self.states.anchors[points]
+        normals = self.states.normals[points]
         slips = away - np.einsum("pi,pi->p", away, normals)[:, None] * normals
         return points, slips, np.linalg.norm(slips, axis=1)
 
@@ -212,7 +240,7 @@ class ToolContact:
         return slipping, (shear_share(lengths, self._stick_mm) / np.maximum(lengths, 1e-300))[:, None] * slips
 
     def _friction_blocks(self, points: IntArray, slips: FloatArray, lengths: FloatArray) -> FloatArray:
-        normals = self._lagged_normals[points]
+        normals = self.states.normals[points]
         tangent_plane = np.eye(3) - normals[:, :, None] * normals[:, None, :]
         direction = slips / np.maximum(lengths, 1e-300)[:, None]
         along = direction[:, :, None] * direction[:, None, :]
@@ -221,5 +249,5 @@ class ToolContact:
         across = np.where(lengths > 1e-9, across, 2.0 / self._stick_mm)
         slope = shear_slope(lengths, self._stick_mm)
         blocks = across[:, None, None] * (tangent_plane - along) + slope[:, None, None] * along
-        result: FloatArray = self._limits[points][:, None, None] * blocks
+        result: FloatArray = self.states.limits[points][:, None, None] * blocks
         return result

@@ -63,6 +63,10 @@ class SurfaceQuadrature:
         result: FloatArray = np.einsum("pa,pai->pi", self.shapes, nodal[self.nodes])
         return result
 
+    def part(self, points: IntArray) -> "SurfaceQuadrature":
+        """Some of the points."""
+        return SurfaceQuadrature(self.nodes[points], self.shapes[points], self.areas[points], self.normals[points])
+
     def scatter(self, forces: FloatArray, count: int) -> FloatArray:
         """Nodal forces (count, 3) of forces at the points (p, 3)."""
         parts = self.shapes[:, :, None] * forces[:, None, :]

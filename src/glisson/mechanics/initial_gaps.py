@@ -48,4 +48,4 @@ def settle_gaps(
             held = np.ones_like(support.points, dtype=bool) if support.conforming else support.pressures > 0.0
             points = support.points[held]
             offsets[points] = cushion.gap(support.pressures[held]) - gaps[points]
-        contact.offsets = offsets
+        contact.states.offsets = offsets

@@ -8,7 +8,8 @@ from scipy.sparse import csr_matrix
 
 from glisson.core.arrays import FloatArray
 from glisson.core.status import Status
-from glisson.mechanics.body import Balance, Body
+from glisson.mechanics.body import Balance, Body, LoadState
+from glisson.mechanics.condenser import CondensedStep, Condenser
 from glisson.mechanics.contact import Touch
 from glisson.mechanics.free_motion import find_free_motion
 from glisson.mechanics.linear_solvers import Factorisation
@@ -20,6 +21,9 @@ _ROUND_OFF = 1e-13  # share of the energy that may be lost to rounding in a diff
 _LONGEST_STEP = 0.05  # of the body's diagonal, for any node in one iteration
 _COUPLED_RESIDUAL = 1e-2  # below it friction that follows the pressure is worth its price
 _COUPLED_GAIN = 0.3  # what such a step must make of the residual to be taken
+_RENEWALS = 12  # iterations of a rough solution in which points that leave lose their cohesion at once
+_PATCHED_HALVINGS = 6
+_INNER_TOLERANCE = 0.1  # of the outer one
 _LOOSE_STEPS = 8  # steps in a row of a body that nothing holds, before its free motion is looked for
 
 
@@ -60,6 +64,8 @@ class Newton:
     def __init__(self, body: Body, factorisation: Factorisation, settings: NewtonSettings) -> None:
         self._body = body
         self._factorisation = factorisation
+        self._condenser = Condenser(body)
+        self._inner_tolerance = _INNER_TOLERANCE * settings.tolerance
         self._settings = settings
         self._longest_step_mm = _LONGEST_STEP * float(np.linalg.norm(np.ptp(body.elasticity.rest, axis=0)))
 
@@ -72,12 +78,18 @@ class Newton:
         tolerance = settings.tolerance if tolerance is None else tolerance
         loose_steps = 0
         for iteration in range(settings.iteration_limit + 1):
+            if tolerance > settings.tolerance and iteration < _RENEWALS:
+                body.renew_cohesion(positions)
             touches = body.touches(positions)
             balance = body.balance(positions, touches)
             if balance.residual <= tolerance:
                 return NewtonEnd(positions, Status.CONVERGED, iteration, balance.residual)
             if iteration == settings.iteration_limit or loose_steps == _LOOSE_STEPS:
                 break
+            moved = self._patched(positions, touches, balance)
+            if moved is not None:
+                positions = moved
+                continue
             direction = self._direction(positions, touches, balance.unbalanced)
             if direction is None:
                 return self._ended(positions, Status.STAGNATED, iteration, balance)
@@ -92,23 +104,66 @@ class Newton:
             positions = moved
         return self._ended(positions, Status.ITERATION_LIMIT, iteration, balance)
 
+    def close(self) -> None:
+        """Give the factors' memory back."""
+        self._factorisation.close()
+        self._condenser.close()
+
     def is_exact(self, end: NewtonEnd) -> bool:
         """Whether an end reached the tolerance of the settings and not only a looser one."""
         return end.status is Status.CONVERGED and end.residual <= self._settings.tolerance
 
-    def predict(self, positions: FloatArray, angles: Sequence[float], external: FloatArray) -> FloatArray:
-        """First-order answer (n, 3) to turning the tools to `angles` and changing the dead loads.
+    def advance(self, positions: FloatArray, goal: LoadState) -> FloatArray | None:
+        """First-order answer (n, 3) to other tools and loads, which become the body's; None where there is none.
 
-        The tools' motion is part of the right-hand side, so that the organ goes along with them instead
-        of being overrun.
+        The organ goes along with moving tools instead of being overrun by them.
         """
         body = self._body
         body.renew_cohesion(positions)
         touches = body.touches(positions)
-        forces = body.balance(positions, touches).unbalanced + body.tool_motion_forces(positions, touches, angles)
-        forces += np.where(body.fixed, 0.0, external - body.external)
-        direction = self._direction(positions, touches, forces)
-        return np.zeros_like(positions) if direction is None else direction.step
+        balance = body.balance(positions, touches)
+        change = np.where(body.fixed, 0.0, goal.external - body.external)
+        patch = self._condenser.patch(positions, goal.tools.angles)
+        if patch is None:
+            direction = self._direction(positions, touches, balance.unbalanced + change)
+            step = None if direction is None else direction.step
+        else:
+            answer = self._condenser.step(patch, positions, touches, balance, change, goal.tools, self._inner_tolerance)
+            step = None if answer is None else answer.step
+        if step is None:
+            return None
+        body.loading = goal
+        return positions + step
+
+    def _patched(self, positions: FloatArray, touches: Sequence[Touch], balance: Balance) -> FloatArray | None:
+        """Newton's step with exact contact at moving tools; None where there are none or that does not pay."""
+        body = self._body
+        tools = body.loading.tools
+        patch = self._condenser.patch(positions, tools.angles)
+        if patch is None:
+            return None
+        memories = [contact.memory() for contact in body.contacts]
+        change = np.zeros_like(positions)
+        answer = self._condenser.step(patch, positions, touches, balance, change, tools, self._inner_tolerance)
+        if answer is not None and self._allowed_share(answer.step) == 1.0:
+            moved = self._search_gain(positions, answer, balance)
+            if moved is not None:
+                return moved
+        for contact, memory in zip(body.contacts, memories, strict=True):
+            contact.recall(memory)
+        return None
+
+    def _search_gain(self, positions: FloatArray, answer: CondensedStep, balance: Balance) -> FloatArray | None:
+        """Backtrack until the energy falls by a share of what the linearised organ promised."""
+        start = self._body.energy(positions)
+        scale = abs(start) + float(np.abs(self._body.external * positions).sum())
+        length = 1.0
+        for _ in range(_PATCHED_HALVINGS):
+            moved: FloatArray = positions + length * answer.step
+            if self._body.energy(moved) <= start - _ARMIJO * length * answer.gain + _ROUND_OFF * scale:
+                return moved
+            length *= 0.5
+        return None
 
     def _allowed_share(self, direction: FloatArray) -> float:
         """How much of a step may be taken: an organ that nothing holds yet must not fly away."""

@@ -73,13 +73,12 @@ class QuasiStatic:
             body = self._body(model, scenario)
         except StageFailed as failure:
             return Deformation(model.mesh, (), failure.status, str(failure))
-        factorisation = make_factorisation()
         settings = NewtonSettings(self._parameters.tolerance, self._parameters.iteration_limit)
+        newton = Newton(body, make_factorisation(), settings)
         try:
-            newton = Newton(body, factorisation, settings)
             return StageRunner(model, scenario, body, newton, self._parameters.step_deg, progress).run()
         finally:
-            factorisation.close()
+            newton.close()
 
     def _body(self, model: Model, scenario: Scenario) -> Body:
         """The body in equilibrium at A, its tools' gaps settled."""

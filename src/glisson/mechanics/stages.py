@@ -1,6 +1,7 @@
 """Takes the body through the stages of a scenario in adaptive load steps."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from math import degrees, radians
 
 import numpy as np
@@ -13,7 +14,7 @@ from glisson.core.protocols import Progress
 from glisson.core.scenario import ContactLaw, Scenario, Stage
 from glisson.core.status import Status
 from glisson.core.units import STANDARD_GRAVITY_MM_S2, density_from_kg_m3, millinewtons_from_newtons
-from glisson.mechanics.body import Body
+from glisson.mechanics.body import Body, LoadState, ToolState
 from glisson.mechanics.contact import ToolContact
 from glisson.mechanics.contact_report import hinge_moment, report_contacts
 from glisson.mechanics.elements import nodal_volumes
@@ -29,15 +30,6 @@ _FIRMER = 2.0
 _ROUGH_TOLERANCE = 1e-2  # while the points that cohere are sought
 _FORCE_ACCURACY = 1e-3
 _LARGEST_ANGLE = radians(90.0)
-
-
-@dataclass(frozen=True, eq=False)
-class _Target:
-    """Tool angles (rad), dead loads (n, 3) and contact law at the end of a ramp."""
-
-    angles: tuple[float, ...]
-    external: FloatArray
-    law: ContactLaw
 
 
 class StageRunner:
@@ -85,28 +77,27 @@ class StageRunner:
                 angles[self._contact_number(drive.lever)] = radians(drive.angle_deg)
         if body.law != stage.contact and stage.drives:
             # The law changes while the tools stand still, and only then do they move.
-            end = self._ramp(stage, _Target(tuple(c.angle for c in body.contacts), body.external, stage.contact))
+            end = self._ramp(stage, self._goal(law=stage.contact))
             if end.status is not Status.CONVERGED:
                 return end
-        end = self._ramp(stage, _Target(tuple(angles), external, stage.contact))
+        end = self._ramp(stage, LoadState(ToolState(tuple(angles), stage.contact), external))
         for drive in stage.drives:
             if drive.force_n is not None and end.status is Status.CONVERGED:
                 end = self._lift_by_force(stage, drive.lever, millinewtons_from_newtons(drive.force_n))
         return end
 
-    def _ramp(self, stage: Stage, target: _Target) -> NewtonEnd:
+    def _ramp(self, stage: Stage, goal: LoadState) -> NewtonEnd:
         """Go to the target, halving the load step where it fails and doubling it where it is easy."""
-        body = self._body
-        start = _Target(tuple(contact.angle for contact in body.contacts), body.external.copy(), body.law)
-        turn = max((abs(b - a) for a, b in zip(start.angles, target.angles, strict=True)), default=0.0)
+        start = self._body.loading
+        turn = max((abs(b - a) for a, b in zip(start.tools.angles, goal.tools.angles, strict=True)), default=0.0)
         steps = max(int(np.ceil(turn / self._step - 1e-9)), 1)
-        if np.linalg.norm(target.external - start.external) > 1e-9 * np.linalg.norm(target.external):
+        if np.linalg.norm(goal.external - start.external) > 1e-9 * np.linalg.norm(goal.external):
             steps = max(steps, _LOAD_STEPS)
         done, share = 0.0, _FIRST_SHARE / steps if turn > 0.0 else 1.0 / steps
         while done < 1.0:
             reach = min(done + share, 1.0)
             self._progress((self._number + reach) / len(self._scenario.stages), self._words(stage))
-            end = self._load_step(_between(start, target, reach))
+            end = self._load_step(start.towards(goal, reach))
             if end.status is Status.CONVERGED:
                 done = 1.0 if reach > 1.0 - 1e-9 else reach
                 self._accept(stage, done, end)
@@ -118,23 +109,29 @@ class StageRunner:
                 share /= 2.0
         return end
 
-    def _load_step(self, goal: _Target) -> NewtonEnd:
+    def _goal(self, angles: Sequence[float] | None = None, law: ContactLaw | None = None) -> LoadState:
+        """The present state with other angles or another law."""
+        present = self._body.loading
+        tools = ToolState(
+            present.tools.angles if angles is None else tuple(angles), present.tools.law if law is None else law
+        )
+        return LoadState(tools, present.external)
+
+    def _load_step(self, goal: LoadState) -> NewtonEnd:
         """Equilibrium at the goal; tools, loads and anchors are put back where it is not reached."""
         body = self._body
-        memories = [contact.memory() for contact in body.contacts]
-        external, law = body.external, body.law
-        moved = self._positions + self._newton.predict(self._positions, goal.angles, goal.external)
-        for contact, angle in zip(body.contacts, goal.angles, strict=True):
-            contact.angle = angle
-        body.external, body.law = goal.external, goal.law
-        if np.isfinite(body.elasticity.energy(moved)):
+        memories, start = [contact.memory() for contact in body.contacts], body.loading
+        moved = self._newton.advance(self._positions, goal)
+        if moved is None:
+            end = NewtonEnd(self._positions, Status.STAGNATED, 0, float("nan"))
+        elif np.isfinite(body.elasticity.energy(moved)):
             end = self._equilibrium(moved)
         else:
             end = NewtonEnd(self._positions, Status.INVERTED, 0, float("nan"))
         if end.status is not Status.CONVERGED:
             for contact, memory in zip(body.contacts, memories, strict=True):
                 contact.recall(memory)
-            body.external, body.law = external, law
+            body.loading = start
         return end
 
     def _equilibrium(self, positions: FloatArray) -> NewtonEnd:
@@ -163,7 +160,7 @@ class StageRunner:
                 break
             for contact in penetrated:
                 contact.cushion = contact.cushion.stiffened(_FIRMER)
-            end = self._load_step(_Target(tuple(contact.angle for contact in body.contacts), body.external, body.law))
+            end = self._load_step(body.loading)
             if end.status is not Status.CONVERGED:
                 return end
             self._accept(stage, 1.0, end)
@@ -209,7 +206,7 @@ class StageRunner:
             goal = [c.angle for c in body.contacts]
             goal[number] = angle + turn
             before, memories = self._positions, [c.memory() for c in body.contacts]
-            end = self._load_step(_Target(tuple(goal), body.external, body.law))
+            end = self._load_step(self._goal(angles=goal))
             if end.status is Status.CONVERGED:
                 reached = wanted - self._moment(number, end.positions)
                 if reached >= -_FORCE_ACCURACY * wanted:
@@ -284,15 +281,6 @@ def fixed_unknowns(model: Model, names: tuple[str, ...]) -> NDArray[np.bool_]:
     for name in names:
         fixed[model.node_set(name)] = True
     return fixed
-
-
-def _between(start: _Target, goal: _Target, share: float) -> _Target:
-    angles = tuple(a + share * (b - a) for a, b in zip(start.angles, goal.angles, strict=True))
-    law = ContactLaw(
-        start.law.friction + share * (goal.law.friction - start.law.friction),
-        start.law.cohesion_kpa + share * (goal.law.cohesion_kpa - start.law.cohesion_kpa),
-    )
-    return _Target(angles, start.external + share * (goal.external - start.external), law)
 
 
 def _sentence(stage: Stage, end: NewtonEnd) -> str:

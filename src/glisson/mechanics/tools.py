@@ -19,6 +19,8 @@ class RigidTool(Protocol):
     name: str
     yields: bool
     """Whether it stands for soft neighbours, into which the organ may press by a fraction of a millimetre."""
+    moves: bool
+    """Whether it is driven; organs follow a moving tool through its edges, which takes a solver of its own."""
 
     def pose(self, angle: float) -> tuple[FloatArray, FloatArray]:
         """Rotation (3, 3) and translation (3,) in mm that take tool points to the patient frame."""
@@ -33,6 +35,7 @@ class BoardTool:
     def __init__(self, board: Board) -> None:
         self.name = board.name
         self.yields = board.conforming
+        self.moves = False
         self._board = board
 
     def pose(self, angle: float) -> tuple[FloatArray, FloatArray]:
@@ -52,6 +55,7 @@ class LeverTool:
     def __init__(self, lever: Lever) -> None:
         self.name = lever.name
         self.yields = False
+        self.moves = True
         self.lever = lever
         self._half = np.array([lever.length_mm, lever.thickness_mm, lever.width_mm]) / 2.0
         self._centre = np.array([lever.length_mm / 2.0, -lever.thickness_mm / 2.0, 0.0])

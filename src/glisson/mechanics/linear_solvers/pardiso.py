@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from glisson.core.arrays import FloatArray
+from glisson.core.arrays import FloatArray, IntArray
 
 _SYMMETRIC_POSITIVE_DEFINITE = 2
-_ANALYSE, _FACTOR, _SOLVE, _RELEASE = 11, 22, 33, -1
+_ANALYSE, _FACTOR, _SOLVE, _FORWARD, _BACKWARD, _RELEASE = 11, 22, 33, 331, 333, -1
 _NOT_POSITIVE_DEFINITE = -4
 
 
@@ -29,67 +29,127 @@ def pardiso_library() -> ctypes.CDLL | None:
     return None
 
 
-class Pardiso:
-    """Cholesky factor of a sparse matrix; a matrix that is not positive definite is told, not solved."""
+class _Handle:
+    """One matrix in PARDISO's memory; its analysis is kept as long as the pattern's size stays the same.
 
-    def __init__(self) -> None:
+    Args:
+        kept: (n,) 1 for the unknowns onto which the matrix is condensed; empty for none.
+    """
+
+    def __init__(self, kept: NDArray[np.int32] | None = None) -> None:
         library = pardiso_library()
         if library is None:
             raise RuntimeError("MKL is not installed.")
         self._call = library.pardiso
-        self._handle = np.zeros(64, dtype=np.int64)
+        self._memory = np.zeros(64, dtype=np.int64)
         self._settings = np.zeros(64, dtype=np.int32)
         self._settings[[0, 1, 9, 34]] = (1, 2, 13, 1)  # own settings, METIS ordering, pivot 1e-13, zero-based
         self._settings[23] = 1  # two-level factorisation, which scales to both cores
+        if kept is not None:
+            self._settings[35] = 2  # the Schur complement comes with the factor, whose halves can be applied alone
+        self._permutation = np.zeros(1, dtype=np.int32) if kept is None else kept
         self._pattern: tuple[int, int] | None = None
         self._matrix: csr_matrix | None = None
 
-    def factor(self, upper: csr_matrix) -> bool:
-        """Factor; the analysis is repeated only when the pattern's size changed."""
+    def factor(self, upper: csr_matrix, out: FloatArray) -> bool:
+        """Factor; `out` takes the Schur complement. False where a pivot is not positive."""
         pattern = (upper.shape[0], upper.nnz)
         if pattern != self._pattern:
             self.close()
-            self._pattern = pattern
-            self._matrix = upper
-            self._run(_ANALYSE, np.zeros(1), np.zeros(1))
+            self._pattern, self._matrix = pattern, upper
+            self.run(_ANALYSE, np.zeros(1), out)
         self._matrix = upper
-        error = self._run(_FACTOR, np.zeros(1), np.zeros(1))
-        return error != _NOT_POSITIVE_DEFINITE
+        return self.run(_FACTOR, np.zeros(1), out) != _NOT_POSITIVE_DEFINITE
 
-    def solve(self, right: FloatArray) -> FloatArray:
-        """Solution with the last factor."""
-        right = np.ascontiguousarray(right, dtype=np.float64)
-        solution = np.zeros_like(right)
-        self._run(_SOLVE, right, solution)
-        return solution
-
-    def close(self) -> None:
-        """Release PARDISO's memory."""
-        if self._pattern is not None:
-            self._run(_RELEASE, np.zeros(1), np.zeros(1))
-            self._pattern = None
-
-    def __del__(self) -> None:
-        self.close()
-
-    def _run(self, phase: int, right: FloatArray, solution: FloatArray) -> int:
-        assert self._matrix is not None  # every caller sets it first
+    def run(self, phase: int, right: FloatArray, solution: FloatArray) -> int:
+        """One phase with the matrix at hand; PARDISO's error number where it only means an indefinite matrix."""
+        assert self._matrix is not None  # every caller factors first
         matrix = self._matrix
         error = ctypes.c_int32(0)
         one = ctypes.byref(ctypes.c_int32(1))
-        permutation = np.zeros(1, dtype=np.int32)
         self._call(
-            _pointer(self._handle), one, one,
+            _pointer(self._memory), one, one,
             ctypes.byref(ctypes.c_int32(_SYMMETRIC_POSITIVE_DEFINITE)),
             ctypes.byref(ctypes.c_int32(phase)),
             ctypes.byref(ctypes.c_int32(matrix.shape[0])),
-            _pointer(matrix.data), _pointer(matrix.indptr), _pointer(matrix.indices), _pointer(permutation), one,
+            _pointer(matrix.data), _pointer(matrix.indptr), _pointer(matrix.indices), _pointer(self._permutation), one,
             _pointer(self._settings), ctypes.byref(ctypes.c_int32(0)),
             _pointer(right), _pointer(solution), ctypes.byref(error),
         )  # fmt: skip
         if error.value not in (0, _NOT_POSITIVE_DEFINITE):
             raise MemoryError(f"PARDISO ended with error {error.value} (−2 is too little memory) in phase {phase}.")
         return error.value
+
+    def close(self) -> None:
+        """Release PARDISO's memory."""
+        if self._pattern is not None:
+            self.run(_RELEASE, np.zeros(1), np.zeros(1))
+            self._pattern = None
+
+    def __del__(self) -> None:
+        if not sys.is_finalizing():
+            self.close()
+
+
+class Pardiso:
+    """Cholesky factor of a sparse matrix; a matrix that is not positive definite is told, not solved."""
+
+    def __init__(self) -> None:
+        self._handle = _Handle()
+
+    def factor(self, upper: csr_matrix) -> bool:
+        """Factor; the analysis is repeated only when the pattern's size changed."""
+        return self._handle.factor(upper, np.zeros(1))
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Solution with the last factor."""
+        right = np.ascontiguousarray(right, dtype=np.float64)
+        solution = np.zeros_like(right)
+        self._handle.run(_SOLVE, right, solution)
+        return solution
+
+    def close(self) -> None:
+        """Release PARDISO's memory."""
+        self._handle.close()
+
+
+class PardisoCondensation:
+    """Schur complement of a sparse matrix onto a few unknowns, for the price of a Cholesky factor."""
+
+    def __init__(self, size: int, kept: IntArray) -> None:
+        marks = np.zeros(size, dtype=np.int32)
+        marks[kept] = 1
+        self._kept, self._handle = kept, _Handle(marks)
+        self._forward = np.zeros(size)
+
+    def factor(self, upper: csr_matrix) -> FloatArray | None:
+        """The Schur complement (k, k); None where the matrix of the other unknowns is not positive definite."""
+        count = len(self._kept)
+        out = np.zeros(max(count**2, upper.shape[0]))
+        # PARDISO goes on to factor the complement, which need not be definite: springs make it so.
+        stiffened = upper.copy()
+        diagonal = upper.indptr[self._kept]  # the first entries of their rows
+        springs = 10.0 * float(np.abs(upper.data).max())
+        stiffened.data[diagonal] += springs
+        if not self._handle.factor(stiffened, out):
+            return None
+        return out[: count**2].reshape(count, count) - springs * np.eye(count)
+
+    def reduce(self, right: FloatArray) -> FloatArray:
+        """The load (k,) that the kept unknowns feel of a right-hand side (n,)."""
+        self._handle.run(_FORWARD, np.array(right, dtype=np.float64), self._forward)
+        return self._forward[self._kept]
+
+    def expand(self, kept: FloatArray) -> FloatArray:
+        """The solution (n,) for the right-hand side of the last `reduce`, the kept unknowns (k,) given."""
+        values, solution = self._forward.copy(), np.zeros_like(self._forward)
+        values[self._kept] = kept
+        self._handle.run(_BACKWARD, values, solution)
+        return solution
+
+    def close(self) -> None:
+        """Release PARDISO's memory."""
+        self._handle.close()
 
 
 def _pointer(array: NDArray[Any]) -> ctypes.c_void_p:

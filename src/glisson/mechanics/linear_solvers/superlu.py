@@ -4,7 +4,9 @@ import numpy as np
 from scipy.sparse import csr_matrix, triu
 from scipy.sparse.linalg import splu
 
-from glisson.core.arrays import FloatArray
+from glisson.core.arrays import FloatArray, IntArray
+
+_COLUMNS = 64  # solved for at a time
 
 
 class SuperLU:
@@ -23,6 +25,42 @@ class SuperLU:
     def solve(self, right: FloatArray) -> FloatArray:
         """Solution with the last factor."""
         solution: FloatArray = self._factor.solve(right)
+        return solution
+
+    def close(self) -> None:
+        """SciPy frees the factor with the object."""
+
+
+class SuperLUCondensation:
+    """Schur complement onto a few unknowns, column by column."""
+
+    def __init__(self, size: int, kept: IntArray) -> None:
+        self._kept, self._inner = kept, np.setdiff1d(np.arange(size), kept)
+        self._lu = SuperLU()
+
+    def factor(self, upper: csr_matrix) -> FloatArray | None:
+        """The Schur complement (k, k); None where the matrix of the other unknowns is not positive definite."""
+        whole = (upper + triu(upper, 1).T).tocsr()
+        if not self._lu.factor(triu(whole[self._inner][:, self._inner]).tocsr()):
+            return None
+        self._coupling = whole[self._inner][:, self._kept]
+        schur: FloatArray = whole[self._kept][:, self._kept].toarray()
+        for first in range(0, len(self._kept), _COLUMNS):
+            columns = slice(first, first + _COLUMNS)
+            schur[:, columns] -= self._coupling.T @ self._lu.solve(self._coupling[:, columns].toarray())
+        return schur
+
+    def reduce(self, right: FloatArray) -> FloatArray:
+        """The load (k,) that the kept unknowns feel of a right-hand side (n,)."""
+        self._alone = self._lu.solve(right[self._inner])
+        reduced: FloatArray = right[self._kept] - self._coupling.T @ self._alone
+        return reduced
+
+    def expand(self, kept: FloatArray) -> FloatArray:
+        """The solution (n,) for the right-hand side of the last `reduce`, the kept unknowns (k,) given."""
+        solution = np.zeros(len(self._kept) + len(self._inner))
+        solution[self._kept] = kept
+        solution[self._inner] = self._alone - self._lu.solve(self._coupling @ kept)
         return solution
 
     def close(self) -> None:
