@@ -21,15 +21,16 @@ from glisson.mechanics.body import ToolState
 from glisson.mechanics.contact import ToolContact, Touch
 from glisson.mechanics.patch import Patch
 
-_ITERATIONS = 40
+_ITERATIONS = 200
 _FARTHEST_MM = 100.0  # displacements beyond it are no answer of a linearised organ
 _HALVINGS = 30
 _ARMIJO = 1e-4
 _ROUND_OFF = 1e-13
 _SMALLEST_SHARE = 1.0 / 512.0
 _ROUGH_TOLERANCE = 1e-2  # of the load, while the points that cohere are sought
-_COUPLED_RESIDUAL = 1e-2
-_COUPLED_GAIN = 0.3
+_COUPLED_RESIDUAL = 0.1
+_COUPLED_GAIN = 0.3  # share of what the linearisation promises that such a step must gain
+_COUPLED_LENGTHS = (1.0, 0.5, 0.25, 0.125)
 _RENEWALS = 40
 _FIRST_WAY_MM = 2.0  # of the tools, in the first of the small steps
 _SHIFTS = (1e-6, 1e-4, 1e-2, 0.1, 1.0)  # shares of the mean diagonal, for a spring that is not definite
@@ -158,10 +159,11 @@ class LocalContact:
         for contact, touch in zip(self._contacts, touches, strict=True):
             self._add(matrix, *contact.friction_by_pressure(touch, points, self._law))
         step = lu_solve(lu_factor(self._free(matrix) + self._spring), unbalanced)
-        moved: FloatArray = displacement + step
-        found = self._unbalanced(moved, self._touches(moved))
-        if float(np.linalg.norm(found)) < _COUPLED_GAIN * residual * self._scale:
-            return moved
+        for length in _COUPLED_LENGTHS:
+            moved: FloatArray = displacement + length * step
+            found = self._unbalanced(moved, self._touches(moved))
+            if float(np.linalg.norm(found)) < (1.0 - _COUPLED_GAIN * length) * residual * self._scale:
+                return moved
         self._touches(displacement)  # friction as it was
         return None
 
