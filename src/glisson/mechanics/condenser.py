@@ -70,7 +70,7 @@ class Condenser:
                 break
         else:
             return None
-        new = condensation.reduce(change.ravel()[free])
+        new = condensation.reduce(change.ravel()[free]) if change.any() else np.zeros(len(patch.kept))
         load = condensation.reduce((others + change).ravel()[free])
         start, goal = body.loading.tools.of(body.moving), goal.of(body.moving)
         near = balance.residual <= _NEAR and start == goal and not new.any()

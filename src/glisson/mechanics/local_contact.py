@@ -11,13 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, lu_factor, lu_solve
 from threadpoolctl import threadpool_limits
 
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.scenario import ContactLaw
-from glisson.mechanics.body import ToolState
+from glisson.mechanics.body import ToolState, scatter_blocks
 from glisson.mechanics.contact import ToolContact, Touch
 from glisson.mechanics.patch import Patch
 
@@ -70,6 +69,8 @@ class LocalContact:
         self._contacts, self._patch, self._points = tuple(contacts), patch, points_mm
         self._spring, self._full_load, self._change, self._scale = spring, load, change, scale
         self._load = load
+        nodes = patch.surface.nodes
+        self._pairs = nodes[:, :, None] * len(patch.nodes) + nodes[:, None, :]
         self._law = ContactLaw()
 
     def settle(self, start: ToolState, goal: ToolState, tolerance: float) -> Settled | None:
@@ -155,10 +156,10 @@ class LocalContact:
         if residual > _COUPLED_RESIDUAL:
             return None
         points = self._moved(displacement)
-        matrix = self._stiffness(displacement, touches, project=False)
+        blocks = self._stiffness(displacement, touches, project=False)
         for contact, touch in zip(self._contacts, touches, strict=True):
-            self._add(matrix, *contact.friction_by_pressure(touch, points, self._law))
-        step = lu_solve(lu_factor(self._free(matrix) + self._spring), unbalanced)
+            self._add(blocks, *contact.friction_by_pressure(touch, points, self._law))
+        step = lu_solve(lu_factor(self._with_spring(blocks)), unbalanced)
         for length in _COUPLED_LENGTHS:
             moved: FloatArray = displacement + length * step
             found = self._unbalanced(moved, self._touches(moved))
@@ -186,8 +187,8 @@ class LocalContact:
         self, displacement: FloatArray, touches: Sequence[Touch], force: FloatArray, project: bool
     ) -> FloatArray | None:
         """Displacement (k,) under a force (k,); the stiffness is made definite only when Cholesky refuses it."""
-        for projected in (project, True):
-            matrix = self._free(self._stiffness(displacement, touches, projected)) + self._spring
+        for projected in (True,) if project else (False, True):
+            matrix = self._with_spring(self._stiffness(displacement, touches, projected))
             step = _cholesky_solve(matrix, force)
             if step is not None:
                 return step
@@ -238,19 +239,22 @@ class LocalContact:
         return touching + float(displacement @ (0.5 * self._spring @ displacement - self._load))
 
     def _stiffness(self, displacement: FloatArray, touches: Sequence[Touch], project: bool) -> FloatArray:
-        """Of the contacts alone, over all the nodes' unknowns."""
-        size = 3 * len(self._patch.nodes)
-        matrix, points = np.zeros((size, size)), self._moved(displacement)
+        """Blocks (m², 3, 3) of the contacts alone."""
+        blocks, points = np.zeros((len(self._patch.nodes) ** 2, 3, 3)), self._moved(displacement)
         for contact, touch in zip(self._contacts, touches, strict=True):
-            self._add(matrix, *contact.stiffness(touch, points, project))
-        return matrix
+            self._add(blocks, *contact.stiffness(touch, points, project))
+        return blocks
 
-    def _add(self, matrix: FloatArray, used: IntArray, local: FloatArray) -> None:
-        _add_blocks(used, local, self._patch.surface.shapes, self._patch.surface.nodes, matrix)
+    def _add(self, blocks: FloatArray, used: IntArray, local: FloatArray) -> None:
+        scatter_blocks(used, local, self._patch.surface.shapes, self._pairs, blocks)
 
-    def _free(self, matrix: FloatArray) -> FloatArray:
-        free = self._patch.unknowns
-        return matrix if len(free) == len(matrix) else matrix[np.ix_(free, free)]
+    def _with_spring(self, blocks: FloatArray) -> FloatArray:
+        """The dense matrix (k, k) of the spring and of blocks (m², 3, 3)."""
+        count, free = len(self._patch.nodes), self._patch.unknowns
+        matrix = blocks.reshape(count, count, 3, 3).transpose(0, 2, 1, 3).reshape(3 * count, 3 * count)
+        whole = len(free) == len(matrix)
+        stiffness: FloatArray = self._spring + (matrix if whole else matrix[np.ix_(free, free)])
+        return stiffness
 
 
 def _cholesky_solve(matrix: FloatArray, force: FloatArray) -> FloatArray | None:
@@ -259,18 +263,3 @@ def _cholesky_solve(matrix: FloatArray, force: FloatArray) -> FloatArray | None:
     except LinAlgError:
         return None
     return solution
-
-
-@njit(cache=True)
-def _add_blocks(used: IntArray, local: FloatArray, shapes: FloatArray, nodes: IntArray, matrix: FloatArray) -> None:
-    """Add N_a N_b times the 3 × 3 matrices `local` (k, 3, 3) of the points `used` (k,) to a dense matrix."""
-    size = shapes.shape[1]
-    for n in range(len(used)):
-        p = used[n]
-        for a in range(size):
-            row = 3 * nodes[p, a]
-            for b in range(size):
-                weight, column = shapes[p, a] * shapes[p, b], 3 * nodes[p, b]
-                for i in range(3):
-                    for j in range(3):
-                        matrix[row + i, column + j] += weight * local[n, i, j]
