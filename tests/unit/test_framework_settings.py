@@ -12,7 +12,7 @@ from glisson.framework import settings_file
 from glisson.framework.settings import PlaneSettings, SegmentSettings, Settings
 from glisson.framework.settings_file import settings_from_table, settings_text
 from glisson.preoperative.attachments import BoxAttachment, DirectionAttachment
-from glisson.preoperative.manoeuvre import LeverLiftParameters
+from glisson.preoperative.lever_placement import LeverLiftParameters
 
 
 @dataclass(frozen=True)

@@ -83,7 +83,7 @@ def deformation() -> Deformation:
     mesh = block((2, 1, 1), (20.0, 10.0, 10.0)).as_quadratic()
     rng = np.random.default_rng(4)
     contact = ContactReport("lever", (0.1, -2.0, 1 / 3), 12.0, 3.0, 0.01, 0.8, 0.2, 24.9, 0.31)
-    away = ContactReport("board", (0.0, 0.0, math.nan), 0.0, math.nan, math.nan, math.nan, 0.0)
+    away = ContactReport("board", (0.0, 0.0, math.nan), 0.0, math.nan, None, math.nan, 0.0)
     stages = (
         StageResult("lift", rng.normal(size=mesh.nodes.shape), Status.CONVERGED, (contact, away)),
         StageResult("settle & slide <2>", rng.normal(size=mesh.nodes.shape), Status.STAGNATED),

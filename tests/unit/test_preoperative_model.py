@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from blocks import block
+from scipy.spatial.transform import Rotation
 
 from glisson.core import Grid, LabelMap, Material, TetMesh
 from glisson.preoperative.attachments import (
@@ -11,7 +12,8 @@ from glisson.preoperative.attachments import (
 )
 from glisson.preoperative.ftetwild import FTetWild, FTetWildParameters
 from glisson.preoperative.label_segmenter import LabelSegmenter, LabelSegmenterParameters
-from glisson.preoperative.manoeuvre import LeverLiftParameters, place_lever, propose_scenario
+from glisson.preoperative.lever_placement import LeverLiftParameters, place_lever
+from glisson.preoperative.manoeuvre import propose_scenario
 from glisson.preoperative.model_building import ModelSettings, build_model
 from glisson.preoperative.regions import element_regions
 from glisson.preoperative.surface import MarchingCubes, MarchingCubesParameters
@@ -132,15 +134,16 @@ def test_lever_lies_under_the_left_lobe_and_just_does_not_touch(built):
     assert scenario.rest_shape == "from-gravity"
 
 
-def test_lever_follows_a_lobe_that_hangs_in_the_air(built):
-    """A body turned by 20° about z: the bar's top is laid against the sloping underside, not under the body."""
+@pytest.mark.parametrize(("axis", "along_deg", "across_deg"), [("z", -20.0, 0.0), ("x", 0.0, 20.0)])
+def test_lever_follows_a_lobe_that_hangs_in_the_air(built, axis, along_deg, across_deg):
+    """A body turned by 20°: the bar's top is laid against the sloping underside, not under the body."""
     _, (model, _) = built
-    turn = np.radians(-20.0)
-    rotation = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1.0]])
-    mesh = TetMesh(model.mesh.nodes @ rotation.T, model.mesh.tetrahedra)
+    turned = Rotation.from_euler(axis, -20.0, degrees=True).apply(np.array(model.mesh.nodes))
+    mesh = TetMesh(turned, model.mesh.tetrahedra)
     lever = place_lever(mesh, LeverLiftParameters(gap_mm=0.5))
     assert 0.4 < lowest_gap(lever, mesh) < 0.7
-    assert np.degrees(np.arctan2(lever.arm[1], lever.arm[0])) == pytest.approx(-20.0, abs=4.0)
+    assert np.degrees(np.arctan2(lever.arm[1], lever.arm[0])) == pytest.approx(along_deg, abs=4.0)
+    assert np.degrees(np.arctan2(lever.up[2], -lever.up[1])) == pytest.approx(across_deg, abs=6.0)
 
 
 def test_label_segmenter_fills_pinholes_and_takes_off_crumbs():

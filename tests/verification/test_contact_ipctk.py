@@ -1,8 +1,9 @@
 """Contact against the IPC Toolkit (ipctk), which knows neither our distances nor our quadrature points.
 
-Our contact acts at 16 points of a face, and a report's least gap is the least at these points; ipctk sees the whole
-surface, finely triangulated. Its least gap may be smaller by as much as the surface nears the tool in between: over a
-rounded edge of radius R, r mm from the nearest point, a flat face nears it by up to r² / 2R.
+Our contact acts at quadrature points, near a lever about a third of its edge's radius apart, and a report's least gap
+is the least at these points; ipctk sees the whole surface, finely triangulated. Its least gap may be smaller by as much
+as the surface nears the tool in between: over a rounded edge of radius R, r mm from the nearest point, a flat face
+nears it by up to r² / 2R.
 """
 
 from dataclasses import dataclass
@@ -27,12 +28,8 @@ REACH_MM = 0.2  # more than any least gap
 INSET_MM = 1.0
 """From a tool with its surface that much further inside, ipctk also measures how deep an organ lies in the tool."""
 ROUNDS = 10  # of bisection, to a thousandth of a small triangle
-NEARER_MM = 0.025
-"""How much nearer than its quadrature points the surface may come: a quarter of the cushion.
-
-`WIDE`, flat on flat: 0.010 mm nearer, at the slab's free edge, 0.8 mm beyond the last points.
-`ALONG`: 0.018 mm nearer, over the rounded edge (R = 3 mm) at r = 0.39 mm, where r² / 2R is 0.025 mm.
-"""
+NEARER_MM = 0.01
+"""How much nearer than its quadrature points the surface may come: a tenth of the cushion. `WIDE` comes 0.003 mm."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +50,10 @@ WIDE = Lift(25.0, 60.0, 20.0, (8, 3, 2))
 ALONG = Lift(15.0, 25.0, 10.0, (8, 6, 2))
 """Narrow and off-centre; element edges (25 mm across) run along the lever's rounded edge (24.5 to 27.5 mm)."""
 ACROSS = Lift(10.0, 25.0, 10.0, (8, 3, 2))
-"""Narrow and off-centre; the lever's rounded edge (19.5 to 22.5 mm) runs through the middle of 16.7 mm wide faces."""
+"""Narrow and off-centre; the lever's rounded edge (19.5 to 22.5 mm) runs through the middle of 16.7 mm wide faces.
+
+With 16 points on each face, whatever its size, the edge lay up to 0.43 mm inside such faces.
+"""
 LIFTS = {"wide": WIDE, "along": ALONG, "across": ACROSS}
 
 
@@ -162,7 +162,7 @@ def test_our_distance_is_that_of_ipctk(name: str) -> None:
     assert low - 1e-9 < gap < high + chord
 
 
-@pytest.mark.parametrize("name", ["wide", "along"])
+@pytest.mark.parametrize("name", LIFTS)
 def test_the_reported_gap_is_that_of_the_surfaces(name: str) -> None:
     end = _lifted(LIFTS[name])
     tool, chord = lever_surface(end.lever, end.angle_deg)
@@ -172,14 +172,3 @@ def test_the_reported_gap_is_that_of_the_surfaces(name: str) -> None:
     gap = pair.distance(REACH_MM)
     assert gap < end.report.least_gap_mm + chord + end.chord_mm
     assert gap > end.report.least_gap_mm - NEARER_MM
-
-
-@pytest.mark.xfail(
-    strict=True,
-    raises=AssertionError,
-    reason="between quadrature points a lever's edge lies up to 0.43 mm inside faces that are wide for its radius",
-)
-def test_an_edge_across_faces_stays_outside_the_organ() -> None:
-    """The reported gap is 0.028 mm. The surface is deepest at r = 1.8 mm, where r² / 2R is 0.54 mm."""
-    end = _lifted(ACROSS)
-    assert not Pair(end.organ, lever_surface(end.lever, end.angle_deg)[0]).intersects

@@ -28,14 +28,16 @@ class ContactReport:
     """One tool at the end of a stage: force of the tool on the organ (LPS, N), area, slip.
 
     `angle_deg` and `hinge_moment_nm` (of the organ's load about the hinge) are None for boards.
-    `sticking` is the fraction of the touching area that sticks.
+    `sticking` is the fraction of the touching area that sticks. `least_gap_mm` is None for bedding, into which an
+    organ sinks; for other tools it is taken at the surface points at which contact acts, counted from where settling
+    the scanned surface against the tools has put them.
     """
 
     tool: str
     force_n: tuple[float, float, float]
     area_mm2: float
     largest_pressure_kpa: float
-    least_gap_mm: float
+    least_gap_mm: float | None
     sticking: float
     largest_slip_mm: float
     angle_deg: float | None = None

@@ -13,7 +13,7 @@ from glisson.core.model import Material
 from glisson.core.parameters import build_parameters, parameter
 from glisson.core.registry import technique_class
 from glisson.preoperative.attachments import DEFAULT_ATTACHMENTS, Attachment
-from glisson.preoperative.manoeuvre import LeverLiftParameters
+from glisson.preoperative.lever_placement import LeverLiftParameters
 from glisson.preoperative.model_building import HUMAN_LIVER
 from glisson.preoperative.regions import ORGAN
 

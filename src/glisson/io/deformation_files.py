@@ -1,7 +1,7 @@
 """A deformation on disk: `deformation.vtu` (a displacement field for each stage) and `deformation.json`.
 
 The JSON file holds status, message, convergence record, events and contacts. A number that is not finite
-(the residual of a failed step, the gap of a tool far away) is null there and NaN when read.
+(the residual of a failed step) is null there and NaN when read; a least gap that is null is None.
 """
 
 from pathlib import Path
@@ -93,7 +93,7 @@ def _contact(record: Record) -> ContactReport:
             force_n=record.vector_or_nan("force_n"),
             area_mm2=record.number_or_nan("area_mm2"),
             largest_pressure_kpa=record.number_or_nan("largest_pressure_kpa"),
-            least_gap_mm=record.number_or_nan("least_gap_mm"),
+            least_gap_mm=record.number_or_none("least_gap_mm"),
             sticking=record.number_or_nan("sticking"),
             largest_slip_mm=record.number_or_nan("largest_slip_mm"),
             angle_deg=record.number_or_none("angle_deg"),

@@ -38,7 +38,7 @@ def _report(body: Body, number: int, positions: FloatArray) -> ContactReport:
         force_n=tuple(newtons_from_millinewtons(float(f)) for f in force),  # type: ignore[arg-type]  # three of them
         area_mm2=float(body.surface.areas[touch.points].sum()),
         largest_pressure_kpa=float(touch.pressures.max(initial=0.0)),
-        least_gap_mm=float(contact.gaps(points).min()),
+        least_gap_mm=None if contact.tool.yields else float(contact.gaps(points).min()),
         sticking=sticking,
         largest_slip_mm=slip,
         angle_deg=degrees(contact.angle) if is_lever else None,

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import roots_jacobi, roots_legendre
 
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.mesh import TET_EDGES, TetMesh
@@ -74,40 +73,57 @@ class SurfaceQuadrature:
         return np.stack([np.bincount(flat, parts[:, :, i].ravel(), minlength=count) for i in range(3)], axis=1)
 
 
-def surface_quadrature(nodes: FloatArray, mesh: TetMesh, order: int = 4) -> SurfaceQuadrature:
-    """order² points on every boundary face, by the conical product rule (Stroud 1971): positive weights.
+def surface_quadrature(nodes: FloatArray, mesh: TetMesh, parts: IntArray | int = 2) -> SurfaceQuadrature:
+    """Points on every boundary face (in the order of `mesh.boundary()`), each side of which is cut in `parts` (f,).
 
     Contact is integrated here and not at the nodes, because a nodal contact lets the corners of a tool
     sink between the nodes; areas are those of the shape in `nodes`.
     """
     triangles, elements = mesh.boundary()
-    barycentric, weights = triangle_rule(order)
-    face_nodes, shapes = triangles, barycentric
+    face_nodes = triangles
     if mesh.is_quadratic:
         face_nodes = np.hstack([triangles, _edge_nodes(mesh, triangles, elements)])
-        pairs = barycentric[:, [0, 1, 2]] * barycentric[:, [1, 2, 0]]
-        shapes = np.hstack([barycentric * (2.0 * barycentric - 1.0), 4.0 * pairs])
     corners = nodes[triangles]
     crossed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     doubled = np.linalg.norm(crossed, axis=1)
-    count = len(weights)
-    return SurfaceQuadrature(
-        np.repeat(face_nodes, count, axis=0),
-        np.tile(shapes, (len(triangles), 1)),
-        (0.5 * doubled[:, None] * weights).ravel(),
-        np.repeat(crossed / doubled[:, None], count, axis=0),
+    parts = np.broadcast_to(np.asarray(parts), (len(triangles),))
+    found = []
+    for number in np.unique(parts):
+        faces = np.flatnonzero(parts == number)
+        barycentric, weights = triangle_rule(int(number))
+        shapes = barycentric
+        if mesh.is_quadratic:
+            pairs = barycentric[:, [0, 1, 2]] * barycentric[:, [1, 2, 0]]
+            shapes = np.hstack([barycentric * (2.0 * barycentric - 1.0), 4.0 * pairs])
+        found.append(
+            (
+                np.repeat(face_nodes[faces], len(weights), axis=0),
+                np.tile(shapes, (len(faces), 1)),
+                (0.5 * doubled[faces, None] * weights).ravel(),
+                np.repeat(crossed[faces] / doubled[faces, None], len(weights), axis=0),
+            )
+        )
+    return SurfaceQuadrature(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+
+
+def triangle_rule(parts: int) -> tuple[FloatArray, FloatArray]:
+    """Barycentric points (3 parts², 3) and weights summing to 1, exact to degree 2.
+
+    Every side is cut in `parts`, and each small triangle has three points of equal weight, at a sixth of its height.
+    """
+    steps = np.arange(parts)
+    a, b = (axis.ravel() for axis in np.meshgrid(steps, steps, indexing="ij"))
+    corner = np.stack([a, b, parts - a - b], axis=1)
+    upright, inverted = corner[corner[:, 2] >= 1], corner[corner[:, 2] >= 2]
+    inner = np.array([[4.0, 1.0, 1.0], [1.0, 4.0, 1.0], [1.0, 1.0, 4.0]]) / 6.0
+    # From its corner of least first coordinates an upright triangle grows along them; an inverted one is its mirror.
+    points = np.concatenate(
+        [
+            (upright[:, None, :] + inner + [0.0, 0.0, -1.0]).reshape(-1, 3),
+            (inverted[:, None, :] + [1.0, 1.0, -1.0] - inner).reshape(-1, 3),
+        ]
     )
-
-
-def triangle_rule(order: int) -> tuple[FloatArray, FloatArray]:
-    """Barycentric points (order², 3) and weights summing to 1, exact to degree 2·order − 1."""
-    radial, radial_weights = roots_jacobi(order, 1.0, 0.0)
-    across, across_weights = roots_legendre(order)
-    radial, across = 0.5 * (radial + 1.0), 0.5 * (across + 1.0)
-    first = np.repeat(radial, order)
-    second = (1.0 - first) * np.tile(across, order)
-    weights = np.outer(radial_weights / radial_weights.sum(), across_weights / across_weights.sum()).ravel()
-    return np.stack([1.0 - first - second, first, second], axis=1), weights
+    return points / parts, np.full(len(points), 1.0 / len(points))
 
 
 def _edge_nodes(mesh: TetMesh, triangles: IntArray, elements: IntArray) -> IntArray:

@@ -20,7 +20,7 @@ from glisson.mechanics.body import ToolState, scatter_blocks
 from glisson.mechanics.contact import ToolContact, Touch
 from glisson.mechanics.patch import Patch
 
-_ITERATIONS = 200
+_ITERATIONS = 40
 _FARTHEST_MM = 100.0  # displacements beyond it are no answer of a linearised organ
 _HALVINGS = 30
 _ARMIJO = 1e-4

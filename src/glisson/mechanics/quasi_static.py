@@ -21,11 +21,14 @@ from glisson.mechanics.initial_gaps import settle_gaps
 from glisson.mechanics.linear_solvers import make_factorisation
 from glisson.mechanics.newton import Newton, NewtonSettings
 from glisson.mechanics.rest_shape import RestShape, find_rest_shape
+from glisson.mechanics.sampling import face_parts
 from glisson.mechanics.stages import StageRunner, fixed_unknowns, gravity_forces
 from glisson.mechanics.tools import make_tool
 
 _CUSHION_STIFFNESS_KPA = 36.0  # over the range; see `Cushion`
 _CUSHION_STIFFNESS_MODULI = 1.8
+_BEDDING = Cushion(range_mm=2.0, stiffness_kpa_mm=1.0, hardening=0.0)
+"""Neighbouring tissue: an organ's weight (0.5 kPa) sinks in by 1.4 mm, as into some centimetres of it."""
 
 
 @dataclass(frozen=True)
@@ -84,15 +87,14 @@ class QuasiStatic:
         """The body in equilibrium at A, its tools' gaps settled."""
         parameters = self._parameters
         mesh = model.mesh
-        surface = surface_quadrature(mesh.nodes, mesh)
+        tools = [make_tool(tool) for tool in scenario.tools]
+        surface = surface_quadrature(mesh.nodes, mesh, face_parts(mesh, tools))
         rest = self._rest_shape(model, scenario, surface)
         stiffest = max(material.young_modulus_kpa for material in model.materials.values())
         slope = max(_CUSHION_STIFFNESS_KPA, _CUSHION_STIFFNESS_MODULI * stiffest) / parameters.contact_range_mm
         cushion = Cushion(parameters.contact_range_mm, slope)
-        tools = [make_tool(tool) for tool in scenario.tools]
         contacts = [
-            ToolContact(tool, surface, replace(cushion, hardening=0.0) if tool.yields else cushion, parameters.stick_mm)
-            for tool in tools
+            ToolContact(tool, surface, _BEDDING if tool.yields else cushion, parameters.stick_mm) for tool in tools
         ]
         settle_gaps(contacts, surface.positions(mesh.nodes), rest.supports, parameters.surface_tolerance_mm)
         elasticity = Elasticity(mesh, model.materials, rest.positions)

@@ -210,8 +210,13 @@ class StageRunner:
             if end.status is Status.CONVERGED:
                 reached = wanted - self._moment(number, end.positions)
                 if reached >= -_FORCE_ACCURACY * wanted:
-                    slope, missing = (missing - reached) / turn, reached
-                    self._accept(stage, 1.0 - missing / wanted, end)
+                    slope = (missing - reached) / turn
+                    self._accept(stage, 1.0 - reached / wanted, end)
+                    # Now, because a stiffer cushion also pushes more.
+                    end = self._without_penetration(stage)
+                    if end.status is not Status.CONVERGED:
+                        return end
+                    missing = wanted - self._moment(number)
                     turn = min(self._step, _GROWTH * turn, max(missing / slope, 1e-6) if slope > 0.0 else np.inf)
                     continue
                 # Too far: go back, so that friction sees a lever that only ever rises.
