@@ -1,3 +1,5 @@
+import io
+import multiprocessing
 import shutil
 import time
 import tracemalloc
@@ -6,18 +8,28 @@ import zlib
 import numpy as np
 import pydicom
 import pytest
-from pydicom.encaps import encapsulate, generate_frames
+from PIL import Image
+from pydicom.encaps import encapsulate
+from pydicom.pixels.decoders.base import get_decoder
 from pydicom.uid import (
     DeflatedExplicitVRLittleEndian,
     JPEG2000Lossless,
+    JPEGBaseline8Bit,
+    JPEGExtended12Bit,
+    JPEGLossless,
     JPEGLosslessSV1,
+    JPEGLSLossless,
     RLELossless,
     generate_uid,
 )
 
 from dicom_samples import (
     change,
+    frames_of,
+    jpeg_extended,
+    needs_jpeg_ls,
     recompress,
+    set_frames,
     slice_dataset,
     stored_values,
     write_multiframe,
@@ -184,13 +196,10 @@ def test_a_codestream_larger_than_its_header(tmp_path):
     paths = write_series(tmp_path, stored_values(2))
     for path in paths:
         recompress(path, JPEG2000Lossless)
-    dataset = pydicom.dcmread(paths[0])
-    frame = bytearray(next(generate_frames(dataset.PixelData, number_of_frames=1)))
+    frame = bytearray(frames_of(paths[0])[0])
     place = frame.index(b"\xff\x4f\xff\x51") + 8
     frame[place : place + 8] = np.array([60000, 60000], ">u4").tobytes()
-    dataset.PixelData = encapsulate([bytes(frame)])
-    dataset["PixelData"].is_undefined_length = True
-    dataset.save_as(paths[0])
+    set_frames(paths[0], [bytes(frame)])
     refused(tmp_path, "its JPEG 2000 image has 60000 × 60000 pixels, its header says 36 × 40")
 
 
@@ -235,21 +244,119 @@ def test_pixels_cut_short(tmp_path):
     refused(tmp_path, paths[1].name)
 
 
-def test_a_syntax_without_decoder_names_the_package(tmp_path):
+def test_a_syntax_without_decoder(tmp_path, monkeypatch):
     for path in write_series(tmp_path, stored_values(2)):
-        dataset = pydicom.dcmread(path)
-        dataset.file_meta.TransferSyntaxUID = JPEGLosslessSV1
-        dataset.PixelData = encapsulate([b"\xff\xd8" + b"\0" * 100 + b"\xff\xd9"])
-        dataset["PixelData"].is_undefined_length = True
-        dataset.save_as(path)
-    sentence = refused(tmp_path, "needs a decoder that is not installed")
+        set_frames(path, [b"\xff\xd8" + b"\0" * 100 + b"\xff\xd9"], JPEGLSLossless)
+    monkeypatch.setattr("pydicom.pixels.decoders.base.Decoder.is_available", False)
+    sentence = refused(tmp_path, "JPEG-LS Lossless Image Compression needs a decoder that is not installed")
     assert "pylibjpeg" in sentence
-    assert "JPEG Lossless" in sentence
     for path in tmp_path.iterdir():
-        dataset = pydicom.dcmread(path)
-        dataset.file_meta.TransferSyntaxUID = pydicom.uid.MPEG2MPML
-        dataset.save_as(path)
-    refused(tmp_path, "is not supported")
+        set_frames(path, [bytes(100)], pydicom.uid.MPEG2MPML)
+    refused(tmp_path, "is not read; save it uncompressed (Explicit VR Little Endian) with another program first")
+
+
+def coded(folder, syntax):
+    """The first file of a series in a JPEG syntax, and its frame."""
+    pixels = stored_values(2)
+    if syntax == JPEGBaseline8Bit:
+        pixels = (pixels >> 4).astype(np.uint8)
+    if syntax == JPEGExtended12Bit:
+        pixels = np.zeros((2, 1024, 256), np.uint16)
+    paths = write_series(folder, pixels)
+    for path, frame in zip(paths, pixels, strict=True):
+        if syntax == JPEGBaseline8Bit:
+            content = io.BytesIO()
+            Image.fromarray(frame).save(content, "JPEG")
+            set_frames(path, [content.getvalue()], syntax)
+        elif syntax == JPEGExtended12Bit:
+            set_frames(path, [jpeg_extended()], syntax)
+        else:
+            recompress(path, syntax)
+    return paths[0], frames_of(paths[0])[0]
+
+
+JPEG_SYNTAXES = [
+    JPEGBaseline8Bit,
+    JPEGExtended12Bit,
+    JPEGLossless,
+    JPEGLosslessSV1,
+    pytest.param(JPEGLSLossless, marks=needs_jpeg_ls),
+]
+
+
+@pytest.mark.parametrize("syntax", JPEG_SYNTAXES)
+def test_jpeg_frames_that_lie(tmp_path, syntax):
+    path, frame = coded(tmp_path, syntax)
+    start = frame.index(bytes([0xFF, {JPEGBaseline8Bit: 0xC0, JPEGExtended12Bit: 0xC1}.get(syntax, frame[3])]))
+    entropy_coded = frame.index(b"\xff\xda") + 10
+    noise = np.random.default_rng(8).integers(0, 255, 3000, dtype=np.uint8).tobytes()
+
+    def changed(place, *values):
+        return frame[:place] + bytes(values) + frame[place + len(values) :]
+
+    for content, complaint in (
+        (noise, "its JPEG pixels are damaged (they do not start as JPEG does), so get the file again."),
+        (b"\xff\xd8\xff\xd9", "damaged (a marker is missing)"),
+        (frame[:start] + frame[entropy_coded - 10 :], "damaged (one frame header is needed)"),
+        (frame[: len(frame) // 2], "damaged (they are cut off)"),
+        (frame[: start + 8], "damaged (they are cut off)"),
+        (frame[: start + 8] + b"\xff\xd9", "damaged (a header is cut off)"),
+        (changed(start + 2, 0, 0), "damaged (a marker is missing)"),
+        (changed(start + 9, 3), "damaged (they are not of one component in one scan)"),
+        (changed(len(frame) // 2, 0xFF, 0xD8), "damaged (a marker stands amid them)"),
+        (changed(start + 5, 0xEA, 0x60, 0xEA, 0x60), "its JPEG image has 60000 × 60000 pixels, its header says"),
+        (changed(start + 4, 17), "its JPEG image has 17 bits a pixel, its header says"),
+        (changed(start + 1, 0xC5), "damaged" if syntax == JPEGLSLossless else "its pixels are not coded as its"),
+    ):
+        set_frames(path, [content])
+        assert path.name in refused(tmp_path, complaint)
+
+
+@pytest.mark.parametrize("syntax", [JPEGLosslessSV1, JPEGExtended12Bit])
+def test_jpeg_pixels_that_do_not_fit_their_header(tmp_path, syntax):
+    path, frame = coded(tmp_path, syntax)
+    start, end = frame.index(b"\xff\xda") + 10, frame.rindex(b"\xff\xd9")
+    third = (end - start) // 3
+    noise = np.random.default_rng(11).integers(0, 255, end - start, dtype=np.uint8).tobytes()
+    for pixels in (
+        b"",
+        noise,
+        frame[start : start + third] + frame[start + 2 * third : end],
+        frame[start : start + 2 * third] + frame[start + third : end],
+        frame[start:end] + b"\x11\x11",
+    ):
+        set_frames(path, [frame[:start] + pixels + frame[end:]])
+        refused(tmp_path, "its JPEG pixels are damaged (")
+
+
+def read_mutated(folder, syntaxes):
+    sentences = []
+    for syntax in syntaxes:
+        path, frame = coded(folder / syntax, syntax)
+        rng = np.random.default_rng(13)
+        for trial in range(24):
+            content = bytearray(frame)
+            if trial % 4 == 0:
+                content = content[: int(rng.integers(2, len(content)))]
+            else:
+                for place in rng.integers(0, len(content) if trial % 4 == 1 else 60, int(rng.integers(1, 5))):
+                    content[place] = int(rng.integers(256))
+            set_frames(path, [bytes(content)])
+            try:
+                read_volume(folder / syntax)
+            except BadInput as error:
+                sentences.append(str(error))
+    assert len(sentences) > 12 * len(syntaxes)
+    assert not any("\n" in sentence for sentence in sentences)
+
+
+def test_mutated_frames_never_end_the_process(tmp_path):
+    syntaxes = [JPEGLosslessSV1, *([JPEGLSLossless] if get_decoder(JPEGLSLossless).is_available else [])]
+    child = multiprocessing.get_context("spawn").Process(target=read_mutated, args=(tmp_path, syntaxes))
+    child.start()
+    child.join(60.0)
+    child.kill()
+    assert child.exitcode == 0
 
 
 def test_frames_and_their_descriptions(tmp_path):

@@ -1,10 +1,29 @@
+import io
+
 import numpy as np
 import pytest
-from pydicom.uid import DeflatedExplicitVRLittleEndian, JPEG2000Lossless, RLELossless, generate_uid
+from PIL import Image
+from pydicom.uid import (
+    DeflatedExplicitVRLittleEndian,
+    JPEG2000Lossless,
+    JPEGBaseline8Bit,
+    JPEGExtended12Bit,
+    JPEGLossless,
+    JPEGLosslessSV1,
+    JPEGLSLossless,
+    JPEGLSNearLossless,
+    RLELossless,
+    generate_uid,
+)
 
 from dicom_samples import (
+    GDCM_LOSSLESS,
     change,
+    jpeg_extended,
+    jpeg_lossless,
+    needs_jpeg_ls,
     recompress,
+    set_frames,
     slice_dataset,
     stored_values,
     strip_preamble,
@@ -14,6 +33,18 @@ from dicom_samples import (
 from glisson.core import BadInput
 from glisson.io.dicom import read_dicom_mask
 from glisson.io.images import read_label_maps, read_labels, read_volume
+from glisson.io.jpeg_extended import decoded_extended
+from glisson.io.jpeg_headers import read_jpeg_frame
+from glisson.io.jpeg_lossless import decoded_lossless
+
+LOSSLESS = [
+    JPEG2000Lossless,
+    RLELossless,
+    DeflatedExplicitVRLittleEndian,
+    JPEGLossless,
+    JPEGLosslessSV1,
+    pytest.param(JPEGLSLossless, marks=needs_jpeg_ls),
+]
 
 
 def test_series_is_sorted_by_place_and_rescaled(tmp_path):
@@ -48,15 +79,82 @@ def test_voxel_centres_follow_the_standard_formula(tmp_path):
         assert volume.voxels[i, j, n] == int(pixels[n, j, i]) - 1024
 
 
-@pytest.mark.parametrize("syntax", [JPEG2000Lossless, RLELossless, DeflatedExplicitVRLittleEndian])
-def test_compressed_series(tmp_path, syntax):
-    pixels = stored_values(3)
-    for path in write_series(tmp_path, pixels):
+@pytest.mark.parametrize("bits", [12, 16])
+@pytest.mark.parametrize("signed", [False, True])
+@pytest.mark.parametrize("syntax", LOSSLESS)
+def test_lossless_series(tmp_path, syntax, signed, bits):
+    lowest = -(1 << (bits - 1)) if signed else 0
+    pixels = np.random.default_rng(bits).integers(lowest, lowest + (1 << bits), (2, 40, 36))
+    pixels[:, 0, :4] = lowest, lowest + (1 << bits) - 1, lowest, lowest + (1 << bits) - 1
+    tags = {"BitsStored": bits, "HighBit": bits - 1, "PixelRepresentation": int(signed), "RescaleSlope": 2}
+    for path in write_series(tmp_path, pixels.astype(np.int16 if signed else np.uint16), **tags):
         recompress(path, syntax)
+    assert np.array_equal(read_volume(tmp_path).voxels, pixels.transpose(2, 1, 0) * 2 - 1024)
+
+
+@pytest.mark.parametrize("predictor", range(1, 8))
+def test_jpeg_lossless_as_coded_by_others(predictor):
+    """All that encoders choose: the predictor, restart intervals, and 16 coded bits for 12 stored ones."""
+    pixels = stored_values(1)[0]
+    for precision in (12, 16):
+        for restart_lines in (0, 1, 3):
+            frame = read_jpeg_frame(jpeg_lossless(pixels, precision, predictor, restart_lines))
+            assert np.array_equal(decoded_lossless(frame), pixels)
+
+
+def test_frames_in_several_fragments(tmp_path):
+    pixels = stored_values(2)
+    for path, frame in zip(write_series(tmp_path, pixels), pixels, strict=True):
+        set_frames(path, [jpeg_lossless(frame, 12)], JPEGLosslessSV1, fragments=3)
     assert np.array_equal(read_volume(tmp_path).voxels, pixels.transpose(2, 1, 0).astype(int) - 1024)
 
 
-@pytest.mark.parametrize("compression", [None, RLELossless, JPEG2000Lossless])
+def test_jpeg_lossless_coded_by_gdcm():
+    row, column = np.mgrid[:16, :20]
+    pixels = (7 * row**2 + 31 * column + np.where((row + column) % 7 == 0, 900, 0)) % 4096
+    assert np.array_equal(decoded_lossless(read_jpeg_frame(GDCM_LOSSLESS)), pixels)
+
+
+@pytest.mark.parametrize("options", [{"quality": 30}, {"quality": 95}, {"quality": 95, "restart_marker_blocks": 3}])
+def test_cosine_blocks_as_pillow_decodes_them(options):
+    pixels = (np.random.default_rng(2).integers(-9, 10, (45, 37)).cumsum(axis=1) + 128).clip(0, 255).astype(np.uint8)
+    coded = io.BytesIO()
+    Image.fromarray(pixels).save(coded, "JPEG", **options)
+    ours = decoded_extended(read_jpeg_frame(coded.getvalue())).astype(int)
+    # Pillow's cosine transform is in whole numbers: it rounds otherwise.
+    assert np.abs(ours - np.asarray(Image.open(coded), dtype=int)).max() <= 1
+
+
+def test_jpeg_extended_of_12_bits(tmp_path):
+    for path in write_series(tmp_path, np.zeros((2, 1024, 256), np.uint16)):
+        set_frames(path, [jpeg_extended()], JPEGExtended12Bit)
+    voxels = read_volume(tmp_path).voxels[..., 0] + 1024
+    # As GDCM 3.2.6 decodes it, whose cosine transform is in whole numbers.
+    rows, columns = [421, 420, 229, 221, 240, 155, 364], [143, 136, 145, 137, 140, 128, 146]
+    assert np.abs(voxels[columns, rows] - [264, 234, 150, 125, 115, 107, 90]).max() <= 1
+    assert voxels.sum() == pytest.approx(3767007, rel=1e-3)
+
+
+def test_jpeg_baseline(tmp_path):
+    pixels = np.full((2, 40, 36), 60, np.uint8)
+    pixels[:, 8:24, 8:16] = 200
+    coded = io.BytesIO()
+    Image.fromarray(pixels[0]).save(coded, "JPEG", quality=100)
+    for path in write_series(tmp_path, pixels):
+        set_frames(path, [coded.getvalue()], JPEGBaseline8Bit)
+    assert np.abs(read_volume(tmp_path).voxels + 1024 - pixels.transpose(2, 1, 0)).max() <= 1
+
+
+@needs_jpeg_ls
+def test_nearly_lossless_series(tmp_path):
+    pixels = stored_values(2)
+    for path in write_series(tmp_path, pixels):
+        recompress(path, JPEGLSNearLossless, jls_error=3)
+    error = read_volume(tmp_path).voxels + 1024 - pixels.transpose(2, 1, 0).astype(int)
+    assert np.abs(error).max() == 3
+
+
+@pytest.mark.parametrize("compression", [None, *LOSSLESS[:2], *LOSSLESS[3:]])
 def test_multiframe_with_shared_and_per_frame_groups(tmp_path, compression):
     pixels = stored_values(5)
     write_multiframe(tmp_path / "enhanced.dcm", pixels, [3, 0, 4, 1, 2])
@@ -143,7 +241,7 @@ def test_no_pixel_is_decoded_before_the_geometry_is_checked(tmp_path, monkeypatc
     def refuse(*_args, **_keywords):
         raise AssertionError("pixels were read")
 
-    monkeypatch.setattr("glisson.io.dicom._decoded", refuse)
+    monkeypatch.setattr("glisson.io.dicom.stored_frames", refuse)
     paths = write_series(tmp_path, stored_values())
     paths[2].unlink()
     with pytest.raises(BadInput, match=r"a slice is missing between z = -37\.50 and z = -32\.50"):

@@ -8,19 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pydicom
 from numpy.typing import NDArray
-from pydicom.encaps import generate_frames
-from pydicom.pixels.decoders.base import get_decoder
-from pydicom.pixels.utils import iter_pixels
 
 from glisson.core import BadInput
 from glisson.io.decoding import check_image_size, decoding
 from glisson.io.dicom_geometry import sorted_slices
-from glisson.io.dicom_headers import ImageFile, Slice, image_files, slices_of, transfer_syntax
+from glisson.io.dicom_headers import ImageFile, Slice, image_files, slices_of
+from glisson.io.dicom_pixels import stored_frames
 from glisson.io.stored_image import StoredImage, in_c_order, whole_type
-
-_CODESTREAM = b"\xff\x4f\xff\x51"  # JPEG 2000: start of codestream, then the size marker
 
 
 def read_dicom_folder(folder: Path, series_uid: str | None = None) -> StoredImage:
@@ -144,43 +139,11 @@ def _frames(slices: list[Slice]) -> Iterator[tuple[int, NDArray[Any]]]:
         by_path.setdefault(one.path, {})[one.frame] = number
     for path, numbers in by_path.items():
         with decoding(path, "a DICOM image"):
-            expected = slices[next(iter(numbers.values()))].shape[::-1]
-            for frame, pixels in enumerate(_decoded(path, expected, len(numbers))):
+            described = slices[next(iter(numbers.values()))]
+            expected = described.shape[::-1]
+            for frame, pixels in enumerate(stored_frames(described, len(numbers))):
                 if pixels.shape != expected or frame not in numbers:
                     raise BadInput(f"its pixels have the size {pixels.shape}, its header says {expected}.")
                 yield numbers.pop(frame), pixels
             if numbers:
                 raise BadInput(f"{len(numbers)} of its frames are missing.")
-
-
-def _decoded(path: Path, expected: tuple[int, int], frames: int) -> Iterator[NDArray[Any]]:
-    dataset = pydicom.dcmread(path, force=True)
-    if "PixelData" not in dataset:
-        raise BadInput("it lacks PixelData (7FE0,0010).")
-    syntax = pydicom.uid.UID(transfer_syntax(dataset))
-    dataset.file_meta.TransferSyntaxUID = syntax
-    try:
-        decoder = get_decoder(syntax)
-    except NotImplementedError:
-        raise BadInput(f"its transfer syntax {syntax.name} is not supported.") from None
-    if not decoder.is_available:
-        wanted = " or ".join(decoder.missing_dependencies)
-        raise BadInput(f"its transfer syntax {syntax.name} needs a decoder that is not installed: {wanted}.")
-    if syntax.is_encapsulated:
-        for frame in generate_frames(dataset.PixelData, number_of_frames=frames):
-            _check_codestream(frame, expected)
-    yield from iter_pixels(dataset)
-
-
-def _check_codestream(frame: bytes, expected: tuple[int, int]) -> None:
-    """A JPEG 2000 codestream has a size of its own, by which its decoder allocates."""
-    start = frame.find(_CODESTREAM)
-    if start < 0:
-        return
-    # After marker, length and capabilities: the extent and the offset of the image, four bytes each.
-    x_end, y_end, x_start, y_start = np.frombuffer(frame[start + 8 : start + 24], dtype=">u4").tolist()
-    if (y_end - y_start, x_end - x_start) != expected:
-        raise BadInput(
-            f"its JPEG 2000 image has {x_end - x_start} × {y_end - y_start} pixels, "
-            f"its header says {expected[1]} × {expected[0]}."
-        )
