@@ -25,7 +25,7 @@ _FARTHEST_MM = 100.0  # displacements beyond it are no answer of a linearised or
 _HALVINGS = 30
 _ARMIJO = 1e-4
 _ROUND_OFF = 1e-13
-_SMALLEST_SHARE = 1.0 / 512.0
+_FAILURES = 4  # of the small steps: beyond them a smaller step of the whole organ costs less
 _ROUGH_TOLERANCE = 1e-2  # of the load, while the points that cohere are sought
 _COUPLED_RESIDUAL = 0.1
 _COUPLED_GAIN = 0.3  # share of what the linearisation promises that such a step must gain
@@ -85,7 +85,7 @@ class LocalContact:
             float(np.linalg.norm(contact.motion(self._points, angle), axis=1).max(initial=0.0))
             for contact, angle in zip(self._contacts, goal.angles, strict=True)
         )
-        done, share = 0.0, min(1.0, _FIRST_WAY_MM / max(way, 1e-300))
+        done, share, failures = 0.0, min(1.0, _FIRST_WAY_MM / max(way, 1e-300)), 0
         while done < 1.0:
             reach = min(done + share, 1.0)
             memories = [contact.memory() for contact in self._contacts]
@@ -97,7 +97,8 @@ class LocalContact:
             for contact, memory in zip(self._contacts, memories, strict=True):
                 contact.recall(memory)
             share /= 2.0
-            if still or share < _SMALLEST_SHARE:
+            failures += 1
+            if still or failures == _FAILURES:
                 return None
         return Settled(displacement, self._energy(np.zeros_like(displacement)) - self._energy(displacement))
 

@@ -116,7 +116,8 @@ class Newton:
     def advance(self, positions: FloatArray, goal: LoadState) -> FloatArray | None:
         """First-order answer (n, 3) to other tools and loads, which become the body's; None where there is none.
 
-        The organ goes along with moving tools instead of being overrun by them.
+        The organ goes along with moving tools instead of being overrun by them; while they stand still, an
+        organ without an answer stays where it is.
         """
         body = self._body
         body.renew_cohesion(positions)
@@ -130,10 +131,10 @@ class Newton:
         else:
             answer = self._condenser.step(patch, positions, touches, balance, change, goal.tools, self._inner_tolerance)
             step = None if answer is None else answer.step
-        if step is None:
+        if step is None and goal.tools.angles != body.loading.tools.angles:
             return None
         body.loading = goal
-        return positions + step
+        return positions if step is None else positions + step
 
     def _patched(self, positions: FloatArray, touches: Sequence[Touch], balance: Balance) -> FloatArray | None:
         """Newton's step with exact contact at moving tools; None where there are none or that does not pay."""
