@@ -1,6 +1,9 @@
+import json
 import os
 import signal
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -31,3 +34,17 @@ def meshed_small_case(tmp_path_factory: pytest.TempPathFactory) -> Path:
         case = make_small_case(tmp_path_factory.mktemp("meshed") / "case")
         PIPELINE.run(case, "scenario")
     return case.folder
+
+
+@pytest.fixture
+def glisson(capfd: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, dict[str, Any]]]:
+    """The command line, run with `--json`: exit code and what it says."""
+    from glisson.cli.main import main
+
+    def run(*words: str | Path) -> tuple[int, dict[str, Any]]:
+        code = main([*map(str, words), "--json"])
+        out, err = capfd.readouterr()
+        assert "Traceback" not in err
+        return code, json.loads(out)
+
+    return run

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from glisson.cli.main import main
 from glisson.framework.case import SETTINGS
 from glisson.io.dicom import read_dicom_mask
 
@@ -20,7 +19,7 @@ Glisson = Callable[..., tuple[int, dict[str, Any]]]
 
 COARSE = ("--mesh.edge-length-mm", "25", "--mesh.envelope-mm", "1.5", "--surface.edge-length-mm", "6")
 LIFT = ("--scenario.angle-deg", "15")
-"""This patient's left lobe is short and thin: from 18° the bar's end crushes it so far that load steps become tiny."""
+"""Less than the usual lift: on some meshes of this short, thin left lobe the bar's end then crushes elements."""
 CLICK_MM = "129,155,123"
 """In the right lobe, away from vessels and tumours, as a person would click."""
 
@@ -40,17 +39,6 @@ def ircad(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
             archive.extractall(folder, filter="data")
     yield folder
     shutil.rmtree(folder)
-
-
-@pytest.fixture
-def glisson(capfd: pytest.CaptureFixture[str]) -> Glisson:
-    def run(*words: str | Path) -> tuple[int, dict[str, Any]]:
-        code = main([*map(str, words), "--json"])
-        out, err = capfd.readouterr()
-        assert "Traceback" not in err
-        return code, json.loads(out)
-
-    return run
 
 
 def plan(case: Path) -> None:
@@ -82,7 +70,6 @@ def check_guidance(said: dict[str, Any], ircad: Path) -> None:
     assert said["tumour"]["name"] == "tumour2"
     assert said["plane"]["rule"] is None
     assert said["wire"] is None
-    assert said["plane"]["carried"]["angle_deg"] > 0.0
     assert 0.05 < said["volume"]["removed_before"] < 0.6
 
 

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from glisson.cli.main import main
 from glisson.core.image import LabelMap
 from glisson.framework.case import SCENARIO, SETTINGS, STALE
 from glisson.io.images import read_labels, write_labels, write_volume
@@ -18,17 +17,9 @@ from small_case import GRID, contents, images, make_small_case, offer_bending
 Glisson = Callable[..., tuple[int, dict[str, Any]]]
 
 
-@pytest.fixture
-def glisson(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Glisson:
+@pytest.fixture(autouse=True)
+def bending(monkeypatch: pytest.MonkeyPatch) -> None:
     offer_bending(monkeypatch)
-
-    def run(*words: str | Path) -> tuple[int, dict[str, Any]]:
-        code = main([*map(str, words), "--json"])
-        out, err = capfd.readouterr()
-        assert "Traceback" not in err
-        return code, json.loads(out)
-
-    return run
 
 
 @pytest.fixture

@@ -19,7 +19,6 @@ from glisson.core.scenario import Lever
 DOWN = np.array([0.0, 1.0, 0.0])
 """Gravity of a patient who lies on the back, and of the organ on its board (LPS)."""
 
-
 _GAP_WEIGHT = 8.0
 """How many mm of bar under the lobe a median gap of 1 mm is worth when the hinge is chosen."""
 
