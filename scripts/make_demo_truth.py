@@ -8,7 +8,7 @@ attachment of another extent. CalculiX has no cohesion; see `glisson.phantom.cal
 
     .venv/bin/python scripts/make_demo_truth.py --work /tmp/truth
 
-The mesh is kept in the work folder (fTetWild gives another one each time). It takes an hour or so.
+The mesh is kept in the work folder. It takes an hour or so.
 """
 
 import argparse
@@ -40,7 +40,7 @@ from glisson.phantom.truth_checks import (
     tumour_motion,
 )
 from glisson.preoperative.attachments import DirectionAttachment, node_sets
-from glisson.preoperative.ftetwild import FTetWild, FTetWildParameters
+from glisson.preoperative.mmg import Mmg, MmgParameters
 
 YOUNG_MODULUS_KPA, POISSON_RATIO, DENSITY_KG_M3 = 7.0, 0.45, 1150.0
 VARIATION = 0.15
@@ -65,7 +65,7 @@ def rest_mesh(anatomy: Anatomy, edge_mm: float, folder: Path) -> TetMesh:
     kept = folder / f"mesh{edge_mm:g}.npz"
     if not kept.is_file():
         surface = surface_of(anatomy.shape.liver, 2.5)
-        mesh = FTetWild(FTetWildParameters(edge_length_mm=edge_mm, envelope_mm=edge_mm / 30.0)).mesh(surface)
+        mesh = Mmg(MmgParameters(edge_length_mm=edge_mm, envelope_mm=edge_mm / 30.0)).mesh(surface)
         np.savez(kept, nodes=mesh.nodes.astype(np.float32), tetrahedra=mesh.tetrahedra)
         say(f"surface {surface.volume_mm3 * 1e-3:.1f} ml, mesh {mesh.volume_mm3 * 1e-3:.1f} ml")
     with np.load(kept) as stored:

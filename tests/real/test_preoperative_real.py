@@ -10,8 +10,8 @@ from glisson.core import LabelMap
 from glisson.geometry.distance import closest_points
 from glisson.io.dicom import read_dicom_mask
 from glisson.io.images import read_labels, read_volume
-from glisson.preoperative.ftetwild import FTetWild, FTetWildParameters
 from glisson.preoperative.label_segmenter import LabelSegmenter, LabelSegmenterParameters
+from glisson.preoperative.mmg import Mmg, MmgParameters
 from glisson.preoperative.model_building import ModelSettings, build_model
 from glisson.preoperative.seeded_contour import SeededContour, SeededContourParameters
 from glisson.preoperative.surface import MarchingCubes, MarchingCubesParameters
@@ -51,7 +51,7 @@ def test_model_from_masks(masks: dict[str, LabelMap], capsys: pytest.CaptureFixt
     tumour_map = LabelMap(tumours, grid, {1: "tumour1", 2: "tumour2"})
     vessels = LabelMap(masks["portalvein"].voxels, grid, {1: "portal"})
     extractor = MarchingCubes(MarchingCubesParameters())
-    mesher = FTetWild(FTetWildParameters(envelope_mm=1.5))
+    mesher = Mmg(MmgParameters(envelope_mm=1.5))
     model, report = build_model(organ, tumour_map, vessels, extractor, mesher, ModelSettings())
     assert abs(report.volume_error) < 0.01
     assert (model.mesh.corner_volumes_mm3 > 0.0).all()

@@ -158,7 +158,7 @@ def test_techniques_lists_every_kind_with_its_package(glisson: Glisson) -> None:
     code, said = glisson("techniques")
     assert code == 0
     rows = {(row["kind"], row["name"]): row for row in said["techniques"]}
-    assert rows["mesher", "ftetwild"]["package"] == "glisson"
+    assert rows["mesher", "mmg"]["package"] == "glisson"
     assert rows["solver", "quasi-static"]["available"] is True
 
 

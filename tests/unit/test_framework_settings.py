@@ -64,7 +64,7 @@ def test_a_change_touches_only_its_line_and_keeps_a_persons_comments() -> None:
 
 
 def test_another_technique_does_not_inherit_parameters() -> None:
-    changed = MANY.choosing("mesh", "ftetwild", {})
+    changed = MANY.choosing("mesh", "mmg", {})
     assert changed.choices["mesh"].parameters == {}
     assert MANY.choosing("mesh", None, {"quality": "best"}).choices["mesh"].parameters == {
         "edge_length_mm": 5.0,
@@ -109,5 +109,5 @@ def test_parameters_are_checked_when_the_technique_is_made(monkeypatch: pytest.M
         return SimpleNamespace(Parameters=Options)
 
     monkeypatch.setattr(settings_module, "technique_class", known)
-    with pytest.raises(BadInput, match=r"case\.toml: mesh \(ftetwild\).*edge_lenght"):
+    with pytest.raises(BadInput, match=r"case\.toml: mesh \(mmg\).*edge_lenght"):
         parsed("[mesh]\nedge_lenght_mm = 3").choices["mesh"].all_parameters("case.toml", 0)

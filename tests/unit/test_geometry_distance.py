@@ -4,7 +4,7 @@ import trimesh
 from blocks import block, sphere
 
 from glisson.core import BadInput, TriangleSurface
-from glisson.geometry.distance import closest_points, inside
+from glisson.geometry.distance import SurfaceTree, closest_points, inside
 
 SIZE = np.array([30.0, 20.0, 10.0])
 
@@ -40,3 +40,15 @@ def test_an_open_surface_has_no_inside():
         inside([[0.0, 0.0, 0.0]], TriangleSurface(np.eye(3), [[0, 1, 2]]))
     with pytest.raises(BadInput, match="without triangles"):
         closest_points([[0.0, 0.0, 0.0]], TriangleSurface(np.eye(3), np.zeros((0, 3))))
+
+
+@pytest.mark.parametrize(
+    "order", [(0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (0, 0, 1), (0, 1, 1), (1, 0, 1), (1, 1, 1)]
+)
+def test_triangles_without_area_are_segments_or_points(order):
+    corners = np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    tree = SurfaceTree(corners, np.array([order]))
+    points = np.random.default_rng(5).normal(scale=3.0, size=(50, 3))
+    low, high = corners[list(order), 0].min(), corners[list(order), 0].max()
+    expected = np.stack([np.clip(points[:, 0], low, high), np.zeros(50), np.zeros(50)], axis=1)
+    np.testing.assert_allclose(tree.nearest(points).closest_mm, expected, atol=1e-9)

@@ -10,10 +10,10 @@ from glisson.preoperative.attachments import (
     attachments_from_tables,
     node_sets,
 )
-from glisson.preoperative.ftetwild import FTetWild, FTetWildParameters
 from glisson.preoperative.label_segmenter import LabelSegmenter, LabelSegmenterParameters
 from glisson.preoperative.lever_placement import LeverLiftParameters, place_lever
 from glisson.preoperative.manoeuvre import propose_scenario
+from glisson.preoperative.mmg import Mmg, MmgParameters
 from glisson.preoperative.model_building import ModelSettings, build_model
 from glisson.preoperative.regions import element_regions
 from glisson.preoperative.surface import MarchingCubes, MarchingCubesParameters
@@ -26,7 +26,7 @@ TUMOUR_MM = np.array([-35.0, 0.0, 5.0])
 def built():
     organ = labels_of("liver", two_lobes, LIVER_GRID)
     tumours = labels_of("tumour1", ellipsoid(tuple(TUMOUR_MM), (14.0, 14.0, 14.0)), LIVER_GRID)
-    mesher = FTetWild(FTetWildParameters(edge_length_mm=12.0, envelope_mm=0.6))
+    mesher = Mmg(MmgParameters(edge_length_mm=12.0, envelope_mm=0.6))
     extractor = MarchingCubes(MarchingCubesParameters(edge_length_mm=5.0))
     return organ, build_model(organ, tumours, None, extractor, mesher, ModelSettings())
 

@@ -28,7 +28,7 @@ REFERENCE = "truth/organ.nii.gz"
 _MARK = "truth/phantom.json"
 
 # About 4,000 quadratic elements: enough for a tumour within a millimetre, and the solve takes about a minute.
-_QUICK_MESH = TechniqueChoice("mesh", "ftetwild", {"edge_length_mm": 24.0, "envelope_mm": 1.0})
+_QUICK_MESH = TechniqueChoice("mesh", "mmg", {"edge_length_mm": 24.0, "envelope_mm": 1.5})
 
 
 def demo_case(folder: str | Path) -> Case:

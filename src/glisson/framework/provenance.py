@@ -16,7 +16,7 @@ from glisson.core.registry import technique_class, technique_package
 from glisson.framework.hashing import content_hash, package_version, source_hash
 
 KEY_PACKAGES = (
-    "glisson", "numpy", "scipy", "numba", "scikit-image", "nibabel", "pydicom", "pytetwild", "mkl",
+    "glisson", "numpy", "scipy", "numba", "scikit-image", "nibabel", "pydicom", "mmgpy", "mkl",
 )  # fmt: skip
 """Packages whose versions are recorded because they can change a number."""
 

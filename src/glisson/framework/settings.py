@@ -87,7 +87,7 @@ SECTIONS: Mapping[str, type[Any]] = MappingProxyType(
 """Section of `case.toml` → dataclass of the keys that are ours there, beside those of a technique."""
 
 DEFAULT_TECHNIQUES = MappingProxyType(
-    {"segment": "seeded-contour", "surface": "marching-cubes", "mesh": "ftetwild", "simulate": "quasi-static"}
+    {"segment": "seeded-contour", "surface": "marching-cubes", "mesh": "mmg", "simulate": "quasi-static"}
 )
 """Section of `case.toml` → technique that is used where none was chosen."""
 

@@ -83,7 +83,7 @@ def _closest_barycentric(p: FloatArray, a: FloatArray, b: FloatArray, c: FloatAr
     if d3 >= 0.0 and d4 <= d3:
         return 0.0, 1.0, 0.0
     vc = d1 * d4 - d3 * d2
-    if vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+    if vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0 and d1 > d3:
         v = d1 / (d1 - d3)
         return 1.0 - v, v, 0.0
     cp = p - c
@@ -91,15 +91,38 @@ def _closest_barycentric(p: FloatArray, a: FloatArray, b: FloatArray, c: FloatAr
     if d6 >= 0.0 and d5 <= d6:
         return 0.0, 0.0, 1.0
     vb = d5 * d2 - d1 * d6
-    if vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
+    if vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0 and d2 > d6:
         w = d2 / (d2 - d6)
         return 1.0 - w, 0.0, w
     va = d3 * d6 - d5 * d4
-    if va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
+    if va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0 and d4 - d3 + d5 - d6 > 0.0:
         w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
         return 0.0, 1.0 - w, w
     total = va + vb + vc
+    if total <= 0.0:  # all three corners on a line, which its longest edge covers
+        return _closest_on_longest_edge(p, a, b, c)
     return va / total, vb / total, vc / total
+
+
+@compiled
+def _closest_on_longest_edge(p: FloatArray, a: FloatArray, b: FloatArray, c: FloatArray) -> tuple[float, float, float]:
+    ab, bc, ca = np.sum((b - a) ** 2), np.sum((c - b) ** 2), np.sum((a - c) ** 2)
+    if ab >= bc and ab >= ca:
+        t = _along(p, a, b, ab)
+        return 1.0 - t, t, 0.0
+    if bc >= ca:
+        t = _along(p, b, c, bc)
+        return 0.0, 1.0 - t, t
+    t = _along(p, c, a, ca)
+    return t, 0.0, 1.0 - t
+
+
+@compiled
+def _along(p: FloatArray, a: FloatArray, b: FloatArray, squared: float) -> float:
+    """Place 0 to 1 on the edge a → b, of this squared length, closest to p."""
+    if squared == 0.0:
+        return 0.0
+    return float(min(max(np.dot(p - a, b - a) / squared, 0.0), 1.0))
 
 
 @compiled

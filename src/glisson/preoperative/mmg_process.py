@@ -1,0 +1,34 @@
+"""The child process in which Mmg runs: `python -m glisson.preoperative.mmg_process IN OUT`.
+
+The C library does not listen to Ctrl-C; in a process of its own it does no harm. IN is an .npz with
+`nodes` (n, 3) mm, `tetrahedra` (m, 4), `longest_mm`, `shortest_mm` and `envelope_mm`; OUT gets `nodes`
+and `tetrahedra`.
+"""
+
+import sys
+
+import numpy as np
+from mmgpy import MmgMesh3D
+
+_GRADATION = 1.6
+"""Largest ratio of neighbouring edges."""
+
+
+def main(source: str, target: str) -> None:
+    """Read a mesh from `source`, make it as coarse as the sizes allow, write it to `target`."""
+    given = np.load(source)
+    mesh = MmgMesh3D(given["nodes"], given["tetrahedra"].astype(np.int32))
+    mesh.remesh(
+        hmax=float(given["longest_mm"]),
+        hmin=float(given["shortest_mm"]),
+        hausd=float(given["envelope_mm"]),
+        hgrad=_GRADATION,
+        # Organs are smooth: edges of the lattice's cut are not to be kept as ridges.
+        angle=0,
+        verbose=-1,
+    )
+    np.savez(target, nodes=mesh.get_vertices(), tetrahedra=mesh.get_tetrahedra())
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], sys.argv[2])
