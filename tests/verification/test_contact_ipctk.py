@@ -113,7 +113,7 @@ def _our_least_gap(end: Lifted) -> tuple[float, float]:
     corners = ((end.organ.vertices - translation) @ rotation)[end.organ.triangles]
     most = np.inf
     for _ in range(ROUNDS):
-        gaps, normals, _ = tool.distance(corners.reshape(-1, 3))
+        gaps, normals = tool.distance(corners.reshape(-1, 3)), tool.derivatives(corners.reshape(-1, 3))[0]
         gaps, sides = gaps.reshape(-1, 3), np.roll(corners, 1, axis=1) - corners
         assert gaps.min() > -end.lever.edge_radius_mm  # deeper inside, our distance is not convex
         turns = np.roll(normals.reshape(-1, 3, 3), 1, axis=1) - normals.reshape(-1, 3, 3)

@@ -153,7 +153,7 @@ class Body:
         pushes = np.zeros_like(points)
         for number in tools:
             pushes += self.contacts[number].forces(touches[number], points)
-        return self.surface.scatter(pushes, len(positions))
+        return self.surface.scatter(pushes)
 
     def stiffness(
         self, positions: FloatArray, touches: Sequence[Touch], project: bool, tools: Iterable[int] | None = None

@@ -86,19 +86,17 @@ class ToolContact:
     def gaps(self, points_mm: FloatArray) -> FloatArray:
         """Gap (p,) of all surface points (p, 3), offsets included."""
         rotation, translation = self.tool.pose(self.angle)
-        distances, _, _ = self.tool.distance((points_mm - translation) @ rotation)
-        gaps: FloatArray = distances + self.states.offsets
+        gaps: FloatArray = self.tool.distance((points_mm - translation) @ rotation) + self.states.offsets
         return gaps
 
     def touch(self, points_mm: FloatArray) -> Touch:
         """The surface points within the cushion."""
         rotation, translation = self.tool.pose(self.angle)
         local = (points_mm - translation) @ rotation
-        distances, normals, curvatures = self.tool.distance(local)
-        gaps = distances + self.states.offsets
+        gaps = self.tool.distance(local) + self.states.offsets
         near = np.flatnonzero(gaps < self.cushion.range_mm)
-        pressures = self.cushion.pressure(gaps[near])
-        return Touch(near, local[near], gaps[near], pressures, normals[near], curvatures[near], rotation)
+        gaps, local = gaps[near], local[near]
+        return Touch(near, local, gaps, self.cushion.pressure(gaps), *self.tool.derivatives(local), rotation)
 
     def renew_cohesion(self, touch: Touch) -> int:
         """Let exactly the touching points cohere; how many of those that did had left the tool."""
@@ -189,13 +187,13 @@ class ToolContact:
         tangent does not vanish when it slips; elsewhere by a soft glue.
         """
         rotation, translation = self.tool.pose(self.angle)
-        distances, normals, _ = self.tool.distance((points_mm - translation) @ rotation)
-        near = np.flatnonzero(distances + self.states.offsets < 2.0 * self.cushion.range_mm)
+        local = (points_mm - translation) @ rotation
+        near = np.flatnonzero(self.tool.distance(local) + self.states.offsets < 2.0 * self.cushion.range_mm)
         glue = _GLUE_SHARE * self.cushion.stiffness_kpa_mm
         along = np.full(len(self.states.limits), glue)
         slipping, _, lengths = self._slips(points_mm)
         along[slipping] = self.states.limits[slipping] / np.maximum(lengths, self._stick_mm)
-        normals = normals[near] @ rotation.T
+        normals = self.tool.derivatives(local[near])[0] @ rotation.T
         outer = normals[:, :, None] * normals[:, None, :]
         held = glue * outer + along[near, None, None] * (np.eye(3) - outer)
         return near, self._surface.areas[near, None, None] * held

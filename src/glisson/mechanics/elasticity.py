@@ -209,7 +209,10 @@ def _scatter_stiffness(parts: FloatArray, slots: IntArray, elements: IntArray, b
     for n in range(len(elements)):
         for a in range(parts.shape[1]):
             for b in range(parts.shape[2]):
-                blocks[slots[elements[n], a, b]] += parts[n, a, b]
+                slot = slots[elements[n], a, b]
+                for i in range(3):
+                    for j in range(3):
+                        blocks[slot, i, j] += parts[n, a, b, i, j]
 
 
 @njit(cache=True, nogil=True)

@@ -1,8 +1,10 @@
 """Quadrature of tetrahedra and of the triangles that bound them."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.mesh import TET_EDGES, TetMesh
@@ -50,27 +52,41 @@ def nodal_volumes(nodes: FloatArray, mesh: TetMesh, element_factors: FloatArray)
 
 @dataclass(frozen=True, eq=False)
 class SurfaceQuadrature:
-    """Points on the boundary: nodes (p, 3 or 6), shape functions (p, 3 or 6), areas (p,) mm², outward normals."""
+    """Points on the boundary: nodes (p, 3 or 6), shape functions (p, 3 or 6), areas (p,) mm², outward normals.
+
+    `count` is the number of nodes of the fields that are taken at the points.
+    """
 
     nodes: IntArray
     shapes: FloatArray
     areas: FloatArray
     normals: FloatArray
+    count: int
+
+    @cached_property
+    def _sampling(self) -> csr_array:
+        points, size = self.shapes.shape
+        starts = np.arange(0, points * size + 1, size)
+        return csr_array((self.shapes.ravel(), self.nodes.ravel(), starts), shape=(points, self.count))
+
+    @cached_property
+    def _gathering(self) -> csr_array:
+        return self._sampling.T.tocsr()
 
     def positions(self, nodal: FloatArray) -> FloatArray:
-        """A nodal field (n, 3) at the points, (p, 3)."""
-        result: FloatArray = np.einsum("pa,pai->pi", self.shapes, nodal[self.nodes])
+        """A nodal field (count, 3) at the points, (p, 3)."""
+        result: FloatArray = self._sampling @ nodal
         return result
 
     def part(self, points: IntArray) -> "SurfaceQuadrature":
         """Some of the points."""
-        return SurfaceQuadrature(self.nodes[points], self.shapes[points], self.areas[points], self.normals[points])
+        rows = (self.nodes[points], self.shapes[points], self.areas[points], self.normals[points])
+        return SurfaceQuadrature(*rows, self.count)
 
-    def scatter(self, forces: FloatArray, count: int) -> FloatArray:
+    def scatter(self, forces: FloatArray) -> FloatArray:
         """Nodal forces (count, 3) of forces at the points (p, 3)."""
-        parts = self.shapes[:, :, None] * forces[:, None, :]
-        flat = self.nodes.ravel()
-        return np.stack([np.bincount(flat, parts[:, :, i].ravel(), minlength=count) for i in range(3)], axis=1)
+        result: FloatArray = self._gathering @ forces
+        return result
 
 
 def surface_quadrature(nodes: FloatArray, mesh: TetMesh, parts: IntArray | int = 2) -> SurfaceQuadrature:
@@ -103,7 +119,8 @@ def surface_quadrature(nodes: FloatArray, mesh: TetMesh, parts: IntArray | int =
                 np.repeat(crossed[faces] / doubled[faces, None], len(weights), axis=0),
             )
         )
-    return SurfaceQuadrature(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+    rows = [np.concatenate(parts) for parts in zip(*found, strict=True)]
+    return SurfaceQuadrature(rows[0], rows[1], rows[2], rows[3], len(nodes))
 
 
 def triangle_rule(parts: int) -> tuple[FloatArray, FloatArray]:

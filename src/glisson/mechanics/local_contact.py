@@ -211,7 +211,7 @@ class LocalContact:
         return nodal.reshape(-1, 3)
 
     def _scatter(self, pushes: FloatArray) -> FloatArray:
-        nodal = self._patch.surface.scatter(pushes, len(self._patch.nodes))
+        nodal = self._patch.surface.scatter(pushes)
         forces: FloatArray = nodal.ravel()[self._patch.unknowns]
         return forces
 

@@ -56,7 +56,7 @@ def make_patch(body: Body, points: IntArray) -> Patch:
     """The patch of the given surface points."""
     part = body.surface.part(points)
     nodes, local = np.unique(part.nodes, return_inverse=True)
-    surface = SurfaceQuadrature(local.reshape(part.nodes.shape), part.shapes, part.areas, part.normals)
+    surface = SurfaceQuadrature(local.reshape(part.nodes.shape), part.shapes, part.areas, part.normals, len(nodes))
     unknowns = np.flatnonzero(~body.fixed[nodes].ravel())
     all_unknowns = (3 * nodes[:, None] + np.arange(3)).ravel()
     kept = np.searchsorted(body.system.free, all_unknowns[unknowns])

@@ -157,7 +157,7 @@ class _InverseProblem:
         for bed in self._beds:
             forces = self.pressures(bed, positions) * self._surface.areas[bed.points]
             pushes[bed.points] += forces[:, None] * bed.normal
-        force += self._surface.scatter(pushes, len(positions))
+        force += self._surface.scatter(pushes)
         force[self._fixed] = 0.0
         return force
 

@@ -26,7 +26,7 @@ def face_parts(mesh: TetMesh, tools: Sequence[RigidTool]) -> IntArray:
     for tool in tools:
         if isinstance(tool, LeverTool):
             rotation, translation = tool.pose(0.0)
-            distances, _, _ = tool.distance((corners.reshape(-1, 3) - translation) @ rotation)
+            distances = tool.distance((corners.reshape(-1, 3) - translation) @ rotation)
             near = distances.reshape(-1, 3).min(axis=1) < _REACH_MM
             # Points lie half a small side apart.
             wanted = np.ceil(longest / (2.0 * _SPACING_RADII * tool.lever.edge_radius_mm)).astype(np.int64)

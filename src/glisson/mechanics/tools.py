@@ -25,8 +25,11 @@ class RigidTool(Protocol):
     def pose(self, angle: float) -> tuple[FloatArray, FloatArray]:
         """Rotation (3, 3) and translation (3,) in mm that take tool points to the patient frame."""
 
-    def distance(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Signed distance (n,) mm of tool-frame points (n, 3), its gradient (n, 3) and Hessian (n, 3, 3)."""
+    def distance(self, points: FloatArray) -> FloatArray:
+        """Signed distance (n,) mm of tool-frame points (n, 3)."""
+
+    def derivatives(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The distance's gradient (n, 3) and Hessian (n, 3, 3) at tool-frame points (n, 3)."""
 
 
 class BoardTool:
@@ -42,11 +45,14 @@ class BoardTool:
         """A board does not move: its frame has the patient's axes and starts at its point."""
         return np.eye(3), self._board.point_mm
 
-    def distance(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Height over the board; a plane has no curvature."""
-        count = len(points)
-        normals = np.tile(self._board.normal, (count, 1))
-        return points @ self._board.normal, normals, np.zeros((count, 3, 3))
+    def distance(self, points: FloatArray) -> FloatArray:
+        """Height over the board."""
+        height: FloatArray = points @ self._board.normal
+        return height
+
+    def derivatives(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """A plane has no curvature."""
+        return np.tile(self._board.normal, (len(points), 1)), np.zeros((len(points), 3, 3))
 
 
 class LeverTool:
@@ -66,12 +72,16 @@ class LeverTool:
         turn = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
         return self._axes @ turn, self.lever.hinge_mm
 
-    def distance(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def distance(self, points: FloatArray) -> FloatArray:
         """Distance to the box with its edges rounded by `edge_radius_mm`."""
+        radius = self.lever.edge_radius_mm
+        result: FloatArray = _box_distance(points - self._centre, self._half - radius) - radius
+        return result
+
+    def derivatives(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Those of the distance to the box inside the rounding."""
         inner = self._half - self.lever.edge_radius_mm
-        result: tuple[FloatArray, FloatArray, FloatArray] = _rounded_box(
-            points - self._centre, inner, self.lever.edge_radius_mm
-        )
+        result: tuple[FloatArray, FloatArray] = _box_derivatives(points - self._centre, inner)
         return result
 
 
@@ -81,23 +91,36 @@ def make_tool(tool: Board | Lever) -> RigidTool:
 
 
 @njit(cache=True)
-def _rounded_box(points: FloatArray, inner: FloatArray, radius: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """A box of half sizes `inner` grown by `radius`: a point's distance to the inner box less the radius."""
+def _box_distance(points: FloatArray, half: FloatArray) -> FloatArray:
+    """Distance (n,) of points to a box of half sizes `half`, negative inside."""
+    distances = np.zeros(len(points))
+    for n in range(len(points)):
+        outside, deepest = 0.0, -np.inf
+        for i in range(3):
+            beyond = abs(points[n, i]) - half[i]
+            deepest = max(deepest, beyond)
+            if beyond > 0.0:
+                outside += beyond * beyond
+        distances[n] = np.sqrt(outside) if outside > 0.0 else deepest
+    return distances
+
+
+@njit(cache=True)
+def _box_derivatives(points: FloatArray, half: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Gradient (n, 3) and Hessian (n, 3, 3) of `_box_distance`."""
     count = len(points)
-    distances, normals, hessians = np.zeros(count), np.zeros((count, 3)), np.zeros((count, 3, 3))
+    normals, hessians = np.zeros((count, 3)), np.zeros((count, 3, 3))
     for n in range(count):
-        beyond = np.abs(points[n]) - inner
+        beyond = np.abs(points[n]) - half
         outside = 0.0
         for i in range(3):
             if beyond[i] > 0.0:
                 outside += beyond[i] ** 2
         if outside == 0.0:  # deep inside: the nearest face counts
             axis = np.argmax(beyond)
-            distances[n] = beyond[axis] - radius
             normals[n, axis] = np.sign(points[n, axis]) if points[n, axis] != 0.0 else 1.0
             continue
         reach = np.sqrt(outside)
-        distances[n] = reach - radius
         for i in range(3):
             if beyond[i] > 0.0:
                 normals[n, i] = np.sign(points[n, i]) * beyond[i] / reach
@@ -106,4 +129,4 @@ def _rounded_box(points: FloatArray, inner: FloatArray, radius: float) -> tuple[
                 if beyond[i] > 0.0 and beyond[j] > 0.0:
                     unit = 1.0 if i == j else 0.0
                     hessians[n, i, j] = (unit - normals[n, i] * normals[n, j]) / reach
-    return distances, normals, hessians
+    return normals, hessians
