@@ -1,5 +1,6 @@
 """The lever lift on a small slab of liver: convergence over stiffness and mesh, drives, misses, cuts."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -7,7 +8,12 @@ import pytest
 from lifts import BOARD, DOWN, WIDE, lift, slab, slab_lever
 
 from glisson.core import BadInput, ContactLaw, Lever, LeverDrive, Scenario, Stage, Status
+from glisson.mechanics import quasi_static
+from glisson.mechanics.body import LoadState
+from glisson.mechanics.contact_law import Cushion
+from glisson.mechanics.newton import NewtonEnd
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
+from glisson.mechanics.stages import StageRunner
 
 
 @pytest.mark.parametrize("young_modulus_kpa", [700.0, 70.0, 12.0, 6.0, 3.0])
@@ -38,6 +44,25 @@ def test_force_and_angle_drives_agree() -> None:
     assert found.angle_deg == pytest.approx(8.0, abs=0.3)
 
 
+def test_a_force_is_balanced_after_the_cushion_was_stiffened(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A cushion into which the lever would sink is stiffened on the way, which pushes more: the force still holds."""
+    stiffened = []
+
+    def stiffer(cushion: Cushion, factor: float) -> Cushion:
+        stiffened.append(factor)
+        return replace(cushion, stiffness_kpa_mm=cushion.stiffness_kpa_mm * factor)
+
+    monkeypatch.setattr(quasi_static, "_CUSHION_STIFFNESS_KPA", 2.0)
+    monkeypatch.setattr(quasi_static, "_CUSHION_STIFFNESS_MODULI", 0.1)
+    monkeypatch.setattr(Cushion, "stiffened", stiffer)
+    answer = lift(slab(7.0, (6, 2, 2)), LeverDrive("lever", force_n=0.47), cohesion_kpa=0.0)
+    assert answer.status is Status.CONVERGED, answer.message
+    assert stiffened
+    lever = next(r for r in answer.stages[0].contacts if r.tool == "lever")
+    assert lever.hinge_moment_nm == pytest.approx(0.47 * 0.070, rel=2e-3)
+    assert lever.least_gap_mm > 0.0
+
+
 def test_refinement_converges() -> None:
     """Three meshes: a material point's lift settles, each refinement changing it less."""
     lifts = []
@@ -49,6 +74,33 @@ def test_refinement_converges() -> None:
     first, second = (np.linalg.norm(b - a) for a, b in pairwise(lifts))
     assert second < 0.5 * first
     assert second < 0.05
+
+
+def test_an_organ_that_flows_ends_where_it_would_have_gone_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without friction the way does not matter: the flow against a fading drag finds the same equilibrium."""
+    stages = (
+        Stage("stage 1", ContactLaw(0.0, 10.0), (LeverDrive("lever", angle_deg=12.0),)),
+        Stage("stage 2", ContactLaw(0.0, 0.0)),
+    )
+    scenario = Scenario((BOARD, WIDE), stages, DOWN, DOWN, ("board",))
+    solver = QuasiStatic(QuasiStaticParameters())
+    at_once = solver.solve(slab(7.0, (6, 2, 2)), scenario)
+    load_step, flowed = StageRunner._load_step, []
+
+    def failing(runner: StageRunner, goal: LoadState) -> NewtonEnd:
+        if goal.tools.law.cohesion_kpa == 0.0 < runner._body.law.cohesion_kpa:
+            flowed.append(goal)
+            return NewtonEnd(runner._positions, Status.ITERATION_LIMIT, 0, 1.0)
+        return load_step(runner, goal)
+
+    monkeypatch.setattr(StageRunner, "_load_step", failing)
+    slowly = solver.solve(slab(7.0, (6, 2, 2)), scenario)
+    assert flowed
+    assert slowly.status is Status.CONVERGED
+    moved = np.linalg.norm(at_once.stages[1].displacement - at_once.stages[0].displacement, axis=1).max()
+    assert moved > 0.5
+    difference = np.linalg.norm(slowly.displacement - at_once.displacement, axis=1).max()
+    assert difference < 1e-3 * moved
 
 
 def test_a_lever_that_misses_is_told() -> None:

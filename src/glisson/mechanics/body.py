@@ -63,6 +63,23 @@ class LoadState:
         return LoadState(self.tools.towards(goal.tools, share), external)
 
 
+@dataclass(frozen=True, eq=False)
+class Drag:
+    """What a thick fluid does in a unit of time: a force of `rates` (n,) in mN/mm towards where nodes (n, 3) were."""
+
+    rates: FloatArray
+    start: FloatArray
+
+    def energy(self, positions: FloatArray) -> float:
+        """Half the work in µJ."""
+        return 0.5 * float(self.rates @ np.sum((positions - self.start) ** 2, axis=1))
+
+    def forces(self, positions: FloatArray) -> FloatArray:
+        """Forces (n, 3) in mN."""
+        forces: FloatArray = self.rates[:, None] * (self.start - positions)
+        return forces
+
+
 class Body:
     """Energy, forces and stiffness of everything, as functions of the node positions (n, 3) in mm.
 
@@ -87,6 +104,7 @@ class Body:
         self.standing = tuple(n for n in range(len(self.contacts)) if n not in self.moving)
         self.external = np.zeros_like(elasticity.rest)
         self.law = ContactLaw()
+        self.drag: Drag | None = None
         self._pattern = block_pattern(elasticity.mesh.tetrahedra, len(elasticity.rest))
         self._pairs = pair_slots(self._pattern, surface.nodes)
         self.hold(fixed)
@@ -134,13 +152,16 @@ class Body:
             return float("inf")
         points = self.surface.positions(positions)
         touching = sum(contact.energy(points) for contact in self.contacts)
-        return elastic + touching - float(np.vdot(self.external, positions - self.elasticity.rest))
+        dragging = 0.0 if self.drag is None else self.drag.energy(positions)
+        return elastic + touching + dragging - float(np.vdot(self.external, positions - self.elasticity.rest))
 
     def balance(self, positions: FloatArray, touches: Sequence[Touch]) -> Balance:
         """All nodal forces and what is left of them on the free unknowns."""
         internal = -self.elasticity.forces(positions)
         contact_forces = self.contact_forces(positions, touches, range(len(self.contacts)))
         unbalanced = internal + contact_forces + self.external
+        if self.drag is not None:
+            unbalanced += self.drag.forces(positions)
         unbalanced[self.fixed] = 0.0
         largest = max(float(np.linalg.norm(part)) for part in (internal, contact_forces, self.external))
         size = float(np.linalg.norm(unbalanced))
@@ -164,6 +185,8 @@ class Body:
         """
         blocks = np.zeros((self._pattern.block_count, 3, 3))
         self.elasticity.add_stiffness(positions, self._pattern, blocks, project)
+        if self.drag is not None:
+            self._pattern.add_diagonal(self.drag.rates, blocks)
         points = self.surface.positions(positions)
         for number in range(len(self.contacts)) if tools is None else tools:
             used, local = self.contacts[number].stiffness(touches[number], points, project)

@@ -50,6 +50,14 @@ def nodal_volumes(nodes: FloatArray, mesh: TetMesh, element_factors: FloatArray)
     return volumes
 
 
+def lumped_volumes(nodes: FloatArray, mesh: TetMesh) -> FloatArray:
+    """Equal parts of the elements' volumes at their nodes (n,), all positive."""
+    size = mesh.tetrahedra.shape[1]
+    parts = np.repeat(quadrature(nodes, mesh).weights.sum(axis=1) / size, size)
+    volumes: FloatArray = np.bincount(mesh.tetrahedra.ravel(), parts, minlength=len(nodes)).astype(np.float64)
+    return volumes
+
+
 @dataclass(frozen=True, eq=False)
 class SurfaceQuadrature:
     """Points on the boundary: nodes (p, 3 or 6), shape functions (p, 3 or 6), areas (p,) mm², outward normals.

@@ -23,6 +23,7 @@ _COUPLED_RESIDUAL = 1e-2  # below it friction that follows the pressure is worth
 _COUPLED_GAIN = 0.3  # what such a step must make of the residual to be taken
 _RENEWALS = 12  # iterations of a rough solution in which points that leave lose their cohesion at once
 _PATCHED_HALVINGS = 6
+_LONGEST_PAUSE = 7  # iterations between attempts at exact contact that failed
 _INNER_TOLERANCE = 0.1  # of the outer one
 _LOOSE_STEPS = 8  # steps in a row of a body that nothing holds, before its free motion is looked for
 
@@ -32,7 +33,7 @@ class NewtonSettings:
     """Relative residual to reach, and iterations allowed."""
 
     tolerance: float = 1e-6
-    iteration_limit: int = 40
+    iteration_limit: int = 25
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +77,7 @@ class Newton:
         """
         body, settings = self._body, self._settings
         tolerance = settings.tolerance if tolerance is None else tolerance
-        loose_steps = 0
+        loose_steps = waits = pause = 0
         for iteration in range(settings.iteration_limit + 1):
             if tolerance > settings.tolerance and iteration < _RENEWALS:
                 body.renew_cohesion(positions)
@@ -86,16 +87,21 @@ class Newton:
                 return NewtonEnd(positions, Status.CONVERGED, iteration, balance.residual)
             if iteration == settings.iteration_limit or loose_steps == _LOOSE_STEPS:
                 break
-            moved = self._patched(positions, touches, balance)
-            if moved is not None:
-                positions = moved
-                continue
+            if waits == 0:
+                moved = self._patched(positions, touches, balance)
+                if moved is not None:
+                    positions, pause = moved, 0
+                    continue
+                pause = min(2 * pause + 1, _LONGEST_PAUSE)
+                waits = pause
+            else:
+                waits -= 1
             direction = self._direction(positions, touches, balance.unbalanced)
             if direction is None:
                 return self._ended(positions, Status.STAGNATED, iteration, balance)
             moved = self._coupled(positions, touches, balance, direction)
             if moved is None:
-                moved = self._search(positions, direction.step, balance)
+                moved = self._search(positions, direction, balance)
             if moved is None:
                 return self._ended(positions, Status.STAGNATED, iteration, balance)
             loose_steps = 0 if direction.held else loose_steps + 1
@@ -232,20 +238,32 @@ class Newton:
         direction[free] = self._factorisation.solve(forces.ravel()[free])
         return direction.reshape(forces.shape) if np.isfinite(direction).all() else None
 
-    def _search(self, positions: FloatArray, direction: FloatArray, balance: Balance) -> FloatArray | None:
-        """Backtrack until the energy falls enough; None where no step lowers it."""
-        start = self._body.energy(positions)
-        slope = -float(np.vdot(balance.unbalanced, direction))
+    def _search(self, positions: FloatArray, direction: _Direction, balance: Balance) -> FloatArray | None:
+        """Backtrack until the energy falls enough; None where no step lowers it.
+
+        Where the organ snaps through, the stiffness that was made definite is much too stiff; there longer
+        steps are tried as long as the energy falls.
+        """
+        body, step = self._body, direction.step
+        start = body.energy(positions)
+        slope = -float(np.vdot(balance.unbalanced, step))
         if slope >= 0.0:
             return None
-        scale = abs(start) + float(np.abs(self._body.external * positions).sum())
+        scale = abs(start) + float(np.abs(body.external * positions).sum())
         length = 1.0
         for _ in range(_HALVINGS):
-            moved = positions + length * direction
-            if self._body.energy(moved) <= start + _ARMIJO * length * slope + _ROUND_OFF * scale:
-                return moved
+            reached = body.energy(positions + length * step)
+            if reached <= start + _ARMIJO * length * slope + _ROUND_OFF * scale:
+                break
             length *= 0.5
-        return None
+        else:
+            return None
+        while length >= 1.0 and direction.blocks is None and self._allowed_share(2.0 * length * step) == 1.0:
+            further = body.energy(positions + 2.0 * length * step)
+            if further >= reached:
+                break
+            length, reached = 2.0 * length, further
+        return positions + length * step
 
     def _ended(self, positions: FloatArray, status: Status, iterations: int, balance: Balance) -> NewtonEnd:
         motion = find_free_motion(self._body, positions)

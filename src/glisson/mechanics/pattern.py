@@ -27,6 +27,12 @@ class BlockPattern:
         """Number of 3 × 3 blocks."""
         return len(self.indices)
 
+    def add_diagonal(self, values: FloatArray, blocks: FloatArray) -> None:
+        """Add to all three unknowns of each node its value (n,)."""
+        rows = np.repeat(np.arange(len(self.indptr) - 1), np.diff(self.indptr))
+        own = np.flatnonzero(rows == self.indices)
+        blocks[own] += values[:, None, None] * np.eye(3)
+
     def matrix(self, blocks: FloatArray) -> bsr_matrix:
         """The matrix of block values (b, 3, 3), over all unknowns."""
         return bsr_matrix((blocks, self.indices, self.indptr))

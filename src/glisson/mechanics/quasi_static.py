@@ -45,7 +45,7 @@ class QuasiStaticParameters:
     surface_tolerance_mm: float = parameter(
         2.0, "how far in mm the scanned surface may lie from a tool and still be taken as touching it", 0.0, 10.0
     )
-    iteration_limit: int = parameter(40, "Newton iterations allowed in one load step", 1, 10_000)
+    iteration_limit: int = parameter(25, "Newton iterations allowed in one load step", 1, 10_000)
 
 
 class QuasiStatic:

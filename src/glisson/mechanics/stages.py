@@ -14,18 +14,25 @@ from glisson.core.protocols import Progress
 from glisson.core.scenario import ContactLaw, Scenario, Stage
 from glisson.core.status import Status
 from glisson.core.units import STANDARD_GRAVITY_MM_S2, density_from_kg_m3, millinewtons_from_newtons
-from glisson.mechanics.body import Body, LoadState, ToolState
+from glisson.mechanics.body import Body, Drag, LoadState, ToolState
 from glisson.mechanics.contact import ToolContact
 from glisson.mechanics.contact_report import hinge_moment, report_contacts
-from glisson.mechanics.elements import nodal_volumes
+from glisson.mechanics.elements import lumped_volumes, nodal_volumes
 from glisson.mechanics.newton import Newton, NewtonEnd
 from glisson.mechanics.tools import LeverTool
 
 _SMALLEST_SHARE = 1.0 / 256.0  # of a stage: smaller load steps are not tried
+_SMALLEST_ANSWER = 1.0 / 16.0
 _LOAD_STEPS = 4  # for a change of gravity
 _FIRST_SHARE = 0.1  # of a full load step, for the first one: the tool only just comes to bear
 _GROWTH = 2.0
 _STIFFENINGS = 6
+_NO_NEAR_EQUILIBRIUM = (Status.ITERATION_LIMIT, Status.STAGNATED)
+_FLOW_SHARE = 0.5  # of a full load step: failing in larger ones may have other reasons
+_FLOW_MM = 0.06  # way of an organ on which a force as large as all others acts, in the first step of the flow
+_FLOW_STEPS = 80
+_EASY = 12  # iterations of a step of the flow after which the drag fades faster
+_THICKEST = 1e3  # of the first drag
 _FIRMER = 2.0
 _ROUGH_TOLERANCE = 1e-2  # while the points that cohere are sought
 _FORCE_ACCURACY = 1e-3
@@ -93,11 +100,14 @@ class StageRunner:
         steps = max(int(np.ceil(turn / self._step - 1e-9)), 1)
         if np.linalg.norm(goal.external - start.external) > 1e-9 * np.linalg.norm(goal.external):
             steps = max(steps, _LOAD_STEPS)
-        done, share = 0.0, _FIRST_SHARE / steps if turn > 0.0 else 1.0 / steps
+        done, share, may_flow = 0.0, _FIRST_SHARE / steps if turn > 0.0 else 1.0 / steps, True
         while done < 1.0:
             reach = min(done + share, 1.0)
             self._progress((self._number + reach) / len(self._scenario.stages), self._words(stage))
             end = self._load_step(start.towards(goal, reach))
+            if end.status in _NO_NEAR_EQUILIBRIUM and may_flow and (turn == 0.0 or share <= _FLOW_SHARE / steps):
+                end = self._flow(start.towards(goal, reach))
+                may_flow = end.status is Status.CONVERGED
             if end.status is Status.CONVERGED:
                 done = 1.0 if reach > 1.0 - 1e-9 else reach
                 self._accept(stage, done, end)
@@ -124,32 +134,79 @@ class StageRunner:
         moved = self._newton.advance(self._positions, goal)
         if moved is None:
             end = NewtonEnd(self._positions, Status.STAGNATED, 0, float("nan"))
-        elif np.isfinite(body.elasticity.energy(moved)):
-            end = self._equilibrium(moved)
         else:
-            end = NewtonEnd(self._positions, Status.INVERTED, 0, float("nan"))
+            end = self._equilibrium(self._uninverted(moved))
         if end.status is not Status.CONVERGED:
             for contact, memory in zip(body.contacts, memories, strict=True):
                 contact.recall(memory)
             body.loading = start
         return end
 
-    def _equilibrium(self, positions: FloatArray) -> NewtonEnd:
-        """Equilibrium in which exactly the touching points cohere.
+    def _flow(self, goal: LoadState) -> NewtonEnd:
+        """Equilibrium at the goal that is not near, as after a slip or a snap: the organ flows there.
+
+        A drag as of a thick fluid makes every step small, anchors of friction follow, and the drag fades as the
+        organ comes to rest; the end is an equilibrium without it.
+        """
+        body = self._body
+        memories, start, before = [contact.memory() for contact in body.contacts], body.loading, self._positions
+        body.loading = goal
+        balance = body.balance(before, body.touches(before))
+        volumes = lumped_volumes(body.elasticity.rest, body.elasticity.mesh)
+        rate = highest = balance.scale / (_FLOW_MM * float(volumes.sum()))
+        iterations = 0
+        for number in range(_FLOW_STEPS):
+            self._progress(None, f"the organ flows to another equilibrium, step {number + 1}")
+            body.drag = Drag(rate * volumes, self._positions)
+            end = self._equilibrium(self._positions, exact=False)
+            iterations += end.iterations
+            dragging = float(np.linalg.norm(body.drag.forces(end.positions)[~body.fixed]))
+            body.drag = None
+            if end.status is Status.CONVERGED:
+                self._positions = end.positions
+                points = body.surface.positions(end.positions)
+                for contact in body.contacts:
+                    contact.drag_anchors(points)
+                if dragging < _ROUGH_TOLERANCE * balance.scale:
+                    end = self._equilibrium(end.positions)
+                    iterations += end.iterations
+                    if end.status is Status.CONVERGED:
+                        return replace(end, iterations=iterations)
+                rate *= 0.25 if end.iterations <= _EASY else 0.5
+            elif rate < _THICKEST * highest:
+                rate *= 4.0
+            else:
+                break
+        self._positions, body.loading = before, start
+        for contact, memory in zip(body.contacts, memories, strict=True):
+            contact.recall(memory)
+        return replace(end, positions=before, status=Status.ITERATION_LIMIT, iterations=iterations)
+
+    def _uninverted(self, moved: FloatArray) -> FloatArray:
+        """As much of a first-order answer as inverts no element; the tools stay where they are."""
+        step, share = moved - self._positions, 1.0
+        while share > _SMALLEST_ANSWER:
+            if np.isfinite(self._body.elasticity.energy(self._positions + share * step)):
+                return self._positions + share * step
+            share /= 2.0
+        return self._positions
+
+    def _equilibrium(self, positions: FloatArray, exact: bool = True) -> NewtonEnd:
+        """Equilibrium in which exactly the touching points cohere; only a rough one unless `exact`.
 
         Points that left a tool lose their cohesion between solutions, first rough and at last exact ones, until
         none has left. Points that newly touch begin to cohere where they are, which needs no force.
         """
         body, newton = self._body, self._newton
         if body.law.cohesion_kpa == 0.0:
-            return newton.solve(positions)
+            return newton.solve(positions, None if exact else _ROUGH_TOLERANCE)
         end, iterations = newton.solve(positions, _ROUGH_TOLERANCE), 0
         while True:
             iterations += end.iterations
             lost = body.renew_cohesion(end.positions) if end.status is Status.CONVERGED else 0
-            if end.status is not Status.CONVERGED or (lost == 0 and newton.is_exact(end)):
+            if end.status is not Status.CONVERGED or (lost == 0 and (not exact or newton.is_exact(end))):
                 return replace(end, iterations=iterations)
-            end = newton.solve(end.positions, _ROUGH_TOLERANCE if lost else None)
+            end = newton.solve(end.positions, _ROUGH_TOLERANCE if lost or not exact else None)
 
     def _without_penetration(self, stage: Stage) -> NewtonEnd:
         """Stiffen the cushions at the end of a stage as long as a surface point lies inside a tool."""
