@@ -110,10 +110,12 @@ def test_an_empty_mask(tmp_path: Path, refused: Refused) -> None:
 
 def test_a_mesh_that_cannot_be_made(tmp_path: Path, refused: Refused) -> None:
     case = make_small_case(tmp_path / "case")
+    _, groups = images()
+    sheet = groups["organ"].voxels.copy()
+    sheet[:, :, : sheet.shape[2] // 2] = sheet[:, :, sheet.shape[2] // 2 + 1 :] = 0
+    write_labels(case.path(ORGAN), LabelMap(sheet, GRID, {1: "liver"}))
     main(["segment", str(case.folder)])
-    # An envelope as wide as the organ: the mesh then loses its volume.
-    message = refused(case.folder, 1, "mesh", case.folder, "--mesh.envelope-mm", "10", "--mesh.edge-length-mm", "100")
-    assert "volume" in message
+    assert "thinner than the lattice" in refused(case.folder, 1, "mesh", case.folder, "--mesh.envelope-mm", "10")
 
 
 @pytest.mark.parametrize(
