@@ -53,13 +53,19 @@ class TechniqueChoice:
         Raises:
             BadInput: the technique cannot be used, or a parameter does not fit it.
         """
-        kind = technique_class(self.kind, self.technique).Parameters
+        kind = self._class(where).Parameters
         seeded = {"seed": seed} if "seed" in {field.name for field in fields(kind)} else {}
         return build_parameters(kind, seeded | dict(self.parameters), f"{where}: {self.section} ({self.technique})")
 
     def make(self, where: str, seed: int) -> Any:
         """The technique, ready for work; raises as `all_parameters`."""
-        return technique_class(self.kind, self.technique)(self.all_parameters(where, seed))
+        return self._class(where)(self.all_parameters(where, seed))
+
+    def _class(self, where: str) -> Any:
+        try:
+            return technique_class(self.kind, self.technique)
+        except BadInput as error:
+            raise BadInput(f"{where}: {self.section}.technique: {error}") from error
 
 
 @dataclass(frozen=True)

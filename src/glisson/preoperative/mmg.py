@@ -205,7 +205,8 @@ def _largest_part(nodes: FloatArray, tetrahedra: IntArray) -> TetMesh:
     if 1.0 - sizes[largest] / sizes.sum() > LARGEST_CRUMB:
         others = ", ".join(f"{s * 1e-3:.1f}" for s in sorted(sizes, reverse=True)[:4])
         raise StageFailed(
-            f"The mesh falls into {count} parts ({others} ml, the largest first); close the mask's gaps or keep one.",
+            f"The mesh falls into {count} parts ({others} ml, the largest first); choose a smaller envelope_mm, or "
+            "close the mask's gaps.",
             Status.STAGNATED,
         )
     kept = tetrahedra[part == largest]
