@@ -7,7 +7,7 @@ from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.materials.law import find_law
 from glisson.mechanics.pattern import block_pattern
 
-LAWS = ("linear-elastic", "neo-hookean", "neo-hookean-log")
+LAWS = ("linear-elastic", "co-rotational", "saint-venant-kirchhoff", "neo-hookean", "neo-hookean-log")
 HYPERELASTIC = LAWS[1:]
 
 
