@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from bodies import body_of, box_mesh, distorted, solve
+from scipy.spatial.transform import Rotation
 
 from glisson.core import Material
 from glisson.mechanics.elasticity import Elasticity
@@ -56,6 +57,25 @@ def test_hyperelastic_laws_do_not_feel_rotation(law_name: str) -> None:
     rotation *= np.sign(np.linalg.det(rotation))
     np.testing.assert_allclose(law.energy(rotation @ gradients, material), law.energy(gradients, material), rtol=1e-12)
     assert np.abs(law.stress(rotation[None], material)).max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("law_name", "stress"),
+    [
+        # Without lateral strain and with ν = 0: a cubic that softens below a stretch of 1/√3, and a straight line.
+        ("saint-venant-kirchhoff", lambda stretch: 7.0 * 0.5 * stretch * (stretch**2 - 1.0)),
+        ("co-rotational", lambda stretch: 7.0 * (stretch - 1.0)),
+    ],
+)
+def test_uniaxial_stress_in_a_turned_frame(law_name: str, stress) -> None:
+    law, material = find_law(law_name), Material(law_name, 7.0, 0.0)
+    turn = Rotation.from_rotvec([0.4, -1.1, 0.7]).as_matrix()
+    stretches = np.array([0.4, 1.0 / np.sqrt(3.0), 0.9, 1.0, 1.3, 2.0])
+    stretched = np.tile(np.eye(3), (len(stretches), 1, 1))
+    stretched[:, 0, 0] = stretches
+    expected = np.zeros_like(stretched)
+    expected[:, 0, 0] = stress(stretches)
+    np.testing.assert_allclose(law.stress(turn @ stretched, material), turn @ expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("law_name", HYPERELASTIC)

@@ -41,7 +41,8 @@ class CoRotational(PlainLaw):
         rotations, _, stretches, _ = _polar(gradients)
         growth = (stretches.sum(axis=1) - 3.0)[:, None, None]
         stress: FloatArray = 2.0 * material.shear_modulus_kpa * (gradients - rotations)
-        return stress + material.lame_lambda_kpa * growth * rotations
+        stress += material.lame_lambda_kpa * growth * rotations
+        return stress
 
     def tangent(self, gradients: FloatArray, material: Material) -> FloatArray:
         """∂P/∂F = 2µ 1 + λ R ⊗ R + (λ (tr(S) − 3) − 2µ) ∂R/∂F."""

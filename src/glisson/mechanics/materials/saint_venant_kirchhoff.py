@@ -41,7 +41,8 @@ class SaintVenantKirchhoff(PlainLaw):
         tangent += material.lame_lambda_kpa * np.einsum("nij,nkl->nijkl", gradients, gradients)
         tangent += material.shear_modulus_kpa * np.einsum("nil,nkj->nijkl", gradients, gradients)
         tangent += material.shear_modulus_kpa * np.einsum("nik,jl->nijkl", left, unit)
-        return tangent.reshape(-1, 9, 9)
+        result: FloatArray = tangent.reshape(-1, 9, 9)
+        return result
 
 
 def _green_strain(gradients: FloatArray) -> FloatArray:
