@@ -1,7 +1,9 @@
 import json
 import os
 import signal
-from collections.abc import Callable
+import tracemalloc
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +36,22 @@ def meshed_small_case(tmp_path_factory: pytest.TempPathFactory) -> Path:
         case = make_small_case(tmp_path_factory.mktemp("meshed") / "case")
         PIPELINE.run(case, "scenario")
     return case.folder
+
+
+@contextmanager
+def _memory_below(limit: float) -> Iterator[None]:
+    tracemalloc.start()
+    try:
+        yield
+        assert tracemalloc.get_traced_memory()[1] < limit
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.fixture
+def memory_below() -> Callable[[float], AbstractContextManager[None]]:
+    """`with memory_below(limit):` fails where the code inside holds more than so many bytes at once."""
+    return _memory_below
 
 
 @pytest.fixture
