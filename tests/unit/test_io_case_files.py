@@ -21,6 +21,7 @@ from glisson.core import (
     LoadStep,
     Material,
     Model,
+    Move,
     Observation,
     Observations,
     Scenario,
@@ -61,7 +62,13 @@ def scenario() -> Scenario:
         "lever", np.array([5.0, 80.0, 7.0]), np.array([1.0, 0, 0.2]), np.array([0, -1.0, 0]), length_mm=120.0
     )
     lift = Stage("lift", ContactLaw(0.5, 10.0), (LeverDrive("lever", angle_deg=25.0),), gravity=False)
-    settle = Stage("settle", ContactLaw(0.1), (LeverDrive("lever", force_n=2.5),), fixed=("back", "cut"))
+    settle = Stage(
+        "settle",
+        ContactLaw(0.1),
+        (LeverDrive("lever", force_n=2.5),),
+        fixed=("back", "cut"),
+        moves=(Move("tip", (1.5, 0.0, -2.0)),),
+    )
     return Scenario((board, bedding, lever), (lift, settle), [0, 1, 0], None, ("board",), "as-scanned")
 
 
@@ -124,7 +131,7 @@ def test_the_keys_of_a_scenario_are_the_agreed_ones(tmp_path):
     table = tomllib.loads((tmp_path / "scenario.toml").read_text())
     assert table["schema"] == 1
     assert set(table) == {"schema", "rest_shape", "scan_gravity", "scan_supports", "boards", "levers", "stages"}
-    assert set(table["stages"][0]) == {"name", "friction", "cohesion_kpa", "gravity", "fixed", "drives"}
+    assert set(table["stages"][0]) == {"name", "friction", "cohesion_kpa", "gravity", "fixed", "drives", "moves"}
     assert table["stages"][1]["drives"] == [{"lever": "lever", "force_n": 2.5}]
 
 

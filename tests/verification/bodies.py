@@ -8,7 +8,7 @@ from glisson.mechanics.contact import ToolContact
 from glisson.mechanics.contact_law import Cushion
 from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.elements import surface_quadrature
-from glisson.mechanics.linear_solvers import make_factorisation
+from glisson.mechanics.linear_solvers import make_direct_solver
 from glisson.mechanics.newton import Newton, NewtonSettings
 from glisson.mechanics.tools import make_tool
 
@@ -53,7 +53,7 @@ def body_of(mesh: TetMesh, material: Material, fixed=None, boards=(), cushion=No
 
 
 def solve(body: Body, positions, tolerance=1e-9, limit=100):
-    return Newton(body, make_factorisation(), NewtonSettings(tolerance, limit)).solve(positions)
+    return Newton(body, make_direct_solver(), NewtonSettings(tolerance, limit)).solve(positions)
 
 
 def floor(height: float = 0.0) -> Board:

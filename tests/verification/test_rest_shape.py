@@ -6,7 +6,7 @@ from glisson.core import Board, ContactLaw, Material, Scenario, Stage, Status
 from glisson.mechanics.body import Body
 from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.elements import surface_quadrature
-from glisson.mechanics.linear_solvers import make_factorisation
+from glisson.mechanics.linear_solvers import make_direct_solver
 from glisson.mechanics.newton import Newton, NewtonSettings
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
 from glisson.mechanics.rest_shape import find_rest_shape
@@ -31,7 +31,7 @@ def test_the_same_loads_give_the_scanned_shape_back(young_modulus_kpa: float) ->
     surface = surface_quadrature(mesh.nodes, mesh)
     rest = find_rest_shape(mesh, model.materials, weights, [], surface, fixed, 2.0)
     body = Body(Elasticity(mesh, model.materials, rest.positions), surface, [], fixed)
-    newton = Newton(body, make_factorisation(), NewtonSettings())
+    newton = Newton(body, make_direct_solver(), NewtonSettings())
     positions = rest.positions
     for share in (0.25, 0.5, 0.75, 1.0):
         body.external = share * weights

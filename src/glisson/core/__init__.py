@@ -14,7 +14,7 @@ from glisson.core.image import Grid, LabelMap, Volume
 from glisson.core.mesh import TetMesh, TriangleSurface
 from glisson.core.model import Material, Model
 from glisson.core.observations import Observation, Observations
-from glisson.core.scenario import Board, ContactLaw, Lever, LeverDrive, Scenario, Stage
+from glisson.core.scenario import Board, ContactLaw, Lever, LeverDrive, Move, Scenario, Stage
 from glisson.core.status import Status
 from glisson.core.structures import Curve, Plane, Structures, Tumour, VesselTree
 from glisson.core.transform import RigidTransform
@@ -37,6 +37,7 @@ __all__ = [
     "LoadStep",
     "Material",
     "Model",
+    "Move",
     "Observation",
     "Observations",
     "Plane",

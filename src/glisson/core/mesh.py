@@ -109,8 +109,11 @@ class TetMesh:
     def boundary(self) -> tuple[IntArray, IntArray]:
         """Outward corner triangles (f, 3) of the boundary in mesh node numbers, and their elements (f,)."""
         faces = self.corners[:, TET_FACES].reshape(-1, 3)
-        _, index, counts = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
-        keep = np.sort(index[counts == 1])
+        keys = np.sort(faces, axis=1)
+        order = np.lexsort(keys.T)
+        same = np.all(keys[order[1:]] == keys[order[:-1]], axis=1)
+        alone = np.append(True, ~same) & np.append(~same, True)
+        keep = np.sort(order[alone])
         return faces[keep], keep // 4
 
     def surface(self) -> TriangleSurface:

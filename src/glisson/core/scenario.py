@@ -110,10 +110,23 @@ class LeverDrive:
 
 
 @dataclass(frozen=True)
-class Stage:
-    """One stage: its own gravity, contact law, fixed node sets and tool motion.
+class Move:
+    """A node set that a stage holds and carries by `displacement_mm` (LPS), as a grasper does that has hold of it."""
 
-    `drives` names the levers that move; the others hold the angle that they had.
+    node_set: str
+    displacement_mm: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        if len(self.displacement_mm) != 3 or not np.isfinite(self.displacement_mm).all():
+            raise BadInput(f"Node set {self.node_set!r} moves by three numbers in mm, not by {self.displacement_mm}.")
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One stage: its own gravity, contact law, fixed node sets, tool motion and carried node sets.
+
+    `drives` names the levers that move; the others hold the angle that they had. What `moves` carries is let go
+    at the stage's end, unless the next stage names it among `fixed` or `moves`.
     """
 
     name: str
@@ -121,6 +134,7 @@ class Stage:
     drives: tuple[LeverDrive, ...] = ()
     gravity: bool = True
     fixed: tuple[str, ...] = ("back",)
+    moves: tuple[Move, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ from typing import Any, cast
 
 import tomli_w
 
-from glisson.core import Board, ContactLaw, Lever, LeverDrive, Scenario, Stage
+from glisson.core import Board, ContactLaw, Lever, LeverDrive, Move, Scenario, Stage
 from glisson.core.arrays import FloatArray
 from glisson.io.atomic import atomic_path
 from glisson.io.records import Record, read_record
@@ -94,12 +94,19 @@ def _stage(record: Record) -> Stage:
             drives=tuple(_drive(entry) for entry in record.records("drives", ())),
             gravity=record.flag("gravity", Stage.gravity),
             fixed=record.texts("fixed", Stage.fixed),
+            moves=tuple(_move(entry) for entry in record.records("moves", ())),
         )
 
 
 def _drive(record: Record) -> LeverDrive:
     with record.building():
         return LeverDrive(record.text("lever"), record.number_or_none("angle_deg"), record.number_or_none("force_n"))
+
+
+def _move(record: Record) -> Move:
+    with record.building():
+        x, y, z = record.floats("displacement_mm", 3)
+        return Move(record.text("node_set"), (float(x), float(y), float(z)))
 
 
 def _board_table(board: Board) -> dict[str, Any]:
@@ -136,4 +143,5 @@ def _stage_table(stage: Stage) -> dict[str, Any]:
         "gravity": stage.gravity,
         "fixed": list(stage.fixed),
         "drives": drives,
+        "moves": [{"node_set": move.node_set, "displacement_mm": list(move.displacement_mm)} for move in stage.moves],
     }

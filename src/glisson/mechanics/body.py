@@ -6,21 +6,24 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.sparse import bsr_matrix, csr_matrix
+from scipy.sparse import bsr_matrix
 
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.scenario import ContactLaw
 from glisson.mechanics.contact import ToolContact, Touch
 from glisson.mechanics.elasticity import Elasticity
-from glisson.mechanics.elements import SurfaceQuadrature
-from glisson.mechanics.pattern import FreeSystem, block_pattern, pair_slots
+from glisson.mechanics.elements import SurfaceQuadrature, lumped_volumes
+from glisson.mechanics.pattern import FreeSystem, Index, Stiffness, block_pattern, pair_slots
+
+_NO_SHIFT_MM = 1e-4  # shifts of nodes against each other that count as none; far above rounding
 
 
 @dataclass(frozen=True, eq=False)
 class Balance:
     """Forces on the nodes (n, 3) in mN; in equilibrium their sum vanishes on the free unknowns.
 
-    `scale` in mN is the largest of the three norms, `residual` the norm of the sum divided by it (0 without any load).
+    `scale` in mN is the largest of the three norms, `residual` the norm of the sum divided by it. A body without
+    stress has the scale of a shift of its nodes by 0.1 µm against each other.
     """
 
     internal: FloatArray
@@ -52,15 +55,20 @@ class ToolState:
 
 @dataclass(frozen=True, eq=False)
 class LoadState:
-    """What is done to the organ: the tools, and dead loads (n, 3) in mN."""
+    """What is done to the organ: the tools, dead loads (n, 3) in mN, and how far held unknowns were carried.
+
+    `carried` (n, 3) in mm counts from the stage's start and is zero on free unknowns.
+    """
 
     tools: ToolState
     external: FloatArray
+    carried: FloatArray
 
     def towards(self, goal: "LoadState", share: float) -> "LoadState":
         """A state on the straight way to another one."""
         external = self.external + share * (goal.external - self.external)
-        return LoadState(self.tools.towards(goal.tools, share), external)
+        carried = self.carried + share * (goal.carried - self.carried)
+        return LoadState(self.tools.towards(goal.tools, share), external, carried)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,26 +113,29 @@ class Body:
         self.external = np.zeros_like(elasticity.rest)
         self.law = ContactLaw()
         self.drag: Drag | None = None
+        lengths = lumped_volumes(elasticity.rest, elasticity.mesh) ** (1.0 / 3.0)
+        self._least_scale = _NO_SHIFT_MM * elasticity.stiffest_kpa * float(np.linalg.norm(lengths))
         self._pattern = block_pattern(elasticity.mesh.tetrahedra, len(elasticity.rest))
         self._pairs = pair_slots(self._pattern, surface.nodes)
         self.hold(fixed)
 
     def hold(self, fixed: NDArray[np.bool_]) -> None:
-        """Change which unknowns (n, 3) are held."""
+        """Change which unknowns (n, 3) are held, where they are now."""
         self.fixed = fixed
-        self.system = FreeSystem(self._pattern, fixed.ravel())
+        self.carried = np.zeros_like(self.elasticity.rest)
+        self.system = FreeSystem(self._pattern, fixed)
 
     @property
     def loading(self) -> LoadState:
         """The present tools and loads."""
         angles = tuple(contact.angle for contact in self.contacts)
-        return LoadState(ToolState(angles, self.law), self.external)
+        return LoadState(ToolState(angles, self.law), self.external, self.carried)
 
     @loading.setter
     def loading(self, state: LoadState) -> None:
         for contact, angle in zip(self.contacts, state.tools.angles, strict=True):
             contact.angle = angle
-        self.law, self.external = state.tools.law, state.external
+        self.law, self.external, self.carried = state.tools.law, state.external, state.carried
 
     def touches(self, positions: FloatArray, update_friction: bool = True) -> tuple[Touch, ...]:
         """Where each tool touches; friction limits follow the present pressure unless told not to."""
@@ -150,8 +161,10 @@ class Body:
         elastic = self.elasticity.energy(positions)
         if not np.isfinite(elastic):
             return float("inf")
-        points = self.surface.positions(positions)
-        touching = sum(contact.energy(points) for contact in self.contacts)
+        touching = 0.0
+        if self.contacts:
+            points = self.surface.positions(positions)
+            touching = sum(contact.energy(points) for contact in self.contacts)
         dragging = 0.0 if self.drag is None else self.drag.energy(positions)
         return elastic + touching + dragging - float(np.vdot(self.external, positions - self.elasticity.rest))
 
@@ -164,12 +177,14 @@ class Body:
             unbalanced += self.drag.forces(positions)
         unbalanced[self.fixed] = 0.0
         largest = max(float(np.linalg.norm(part)) for part in (internal, contact_forces, self.external))
-        size = float(np.linalg.norm(unbalanced))
-        residual = size / largest if largest > 0.0 else 0.0
-        return Balance(internal, contact_forces, self.external, largest, residual, unbalanced)
+        scale = max(largest, self._least_scale)
+        residual = float(np.linalg.norm(unbalanced)) / scale
+        return Balance(internal, contact_forces, self.external, scale, residual, unbalanced)
 
     def contact_forces(self, positions: FloatArray, touches: Sequence[Touch], tools: Iterable[int]) -> FloatArray:
         """Nodal forces (n, 3) in mN of the tools of the given numbers."""
+        if not touches:
+            return np.zeros_like(positions)
         points = self.surface.positions(positions)
         pushes = np.zeros_like(points)
         for number in tools:
@@ -207,9 +222,14 @@ class Body:
             used, local = contact.bond(points)
             scatter_blocks(used, local, self.surface.shapes, self._pairs, blocks)
 
-    def upper(self, blocks: FloatArray) -> csr_matrix:
-        """Upper triangle of the free unknowns' matrix."""
-        return self.system.matrix(blocks)
+    def add_shift(self, share: float, blocks: FloatArray) -> None:
+        """Add a share of the mean diagonal to the diagonal."""
+        mean = float(self._pattern.diagonal(blocks).mean())
+        self._pattern.add_diagonal(np.full(len(self.fixed), share * mean), blocks)
+
+    def tangent(self, positions: FloatArray, blocks: FloatArray) -> Stiffness:
+        """The matrix of stiffness blocks found at the positions, for solvers."""
+        return Stiffness(self._pattern, self.system, blocks, positions)
 
     def matrix(self, blocks: FloatArray) -> bsr_matrix:
         """The stiffness over all unknowns, for products with nodal fields."""
@@ -217,7 +237,7 @@ class Body:
 
 
 @njit(cache=True)
-def scatter_blocks(used: IntArray, local: FloatArray, shapes: FloatArray, pairs: IntArray, blocks: FloatArray) -> None:
+def scatter_blocks(used: IntArray, local: FloatArray, shapes: FloatArray, pairs: Index, blocks: FloatArray) -> None:
     """Add N_a N_b times the 3 × 3 matrices `local` (k, 3, 3) of the surface points `used` (k,) to the blocks."""
     size = shapes.shape[1]
     for n in range(len(used)):

@@ -65,7 +65,7 @@ class Condenser:
         points = body.surface.positions(positions)[patch.points]
         for project in (False, True):
             blocks = body.stiffness(positions, touches, project, tools=body.standing)
-            spring = condensation.factor(body.upper(blocks))
+            spring = condensation.factor(body.tangent(positions, blocks).upper)
             if spring is not None:
                 break
         else:

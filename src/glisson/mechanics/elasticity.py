@@ -1,7 +1,7 @@
 """Elastic energy, internal forces and stiffness of the organ, assembled over its elements."""
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TypeVar
@@ -12,11 +12,11 @@ from numba import njit
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.mesh import TetMesh
 from glisson.core.model import Material
-from glisson.mechanics.elements import quadrature
+from glisson.mechanics.elements import ElementQuadrature, quadrature
 from glisson.mechanics.materials.law import Law, find_law
-from glisson.mechanics.pattern import BlockPattern
+from glisson.mechanics.pattern import BlockPattern, Index
 
-_CHUNK = 4096  # elements whose tangents and stiffness are held at once (about 40 MB for T10)
+_CHUNK = 2048  # elements whose tangents and stiffness are held at once, small enough for a core's cache
 _CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -47,38 +47,49 @@ class Elasticity:
     def __init__(self, mesh: TetMesh, materials: Mapping[int, Material], rest: FloatArray) -> None:
         self.mesh = mesh
         self.rest = rest
+        self.stiffest_kpa = max(material.young_modulus_kpa for material in materials.values())
         self._quadrature = quadrature(rest, mesh)
-        # Elements are taken region by region, in chunks, so that each chunk has one law.
-        self._chunks: list[_Chunk] = []
-        size = min(_CHUNK, -(-len(mesh.tetrahedra) // _CORES))
-        for region in np.unique(mesh.region_numbers):
-            elements = np.flatnonzero(mesh.region_numbers == region)
-            law = find_law(materials[int(region)].law)
-            parts = np.array_split(elements, -(-len(elements) // size))
-            self._chunks += [_Chunk(part, law, materials[int(region)]) for part in parts]
+        # Each core has a run of chunks, and each chunk one law.
+        parts = np.array_split(np.arange(len(mesh.tetrahedra)), min(_CORES, len(mesh.tetrahedra)))
+        self._runs = [
+            [
+                chunk
+                for region in np.unique(mesh.region_numbers[part])
+                for chunk in self._chunks(part, region, materials)
+            ]
+            for part in parts
+        ]
+        self._node_ranges = [(int(mesh.tetrahedra[p].min()), int(mesh.tetrahedra[p].max())) for p in parts]
+
+    def _chunks(self, part: IntArray, region: int, materials: Mapping[int, Material]) -> list[_Chunk]:
+        """The elements of one region among those of the numbers `part`."""
+        elements = part[self.mesh.region_numbers[part] == region]
+        material = materials[int(region)]
+        law = find_law(material.law)
+        return [_Chunk(piece, law, material) for piece in np.array_split(elements, -(-len(elements) // _CHUNK))]
 
     def energy(self, positions: FloatArray) -> float:
         """Strain energy in µJ at node positions (n, 3); infinite where an element is inverted."""
 
-        def part(chunk: _Chunk) -> float:
+        def of(chunk: _Chunk) -> float:
             gradients = self._gradients(positions, chunk.elements).reshape(-1, 3, 3)
             weights = self._quadrature.weights[chunk.elements].ravel()
             return float(chunk.law.energy(gradients, chunk.material) @ weights)
 
-        return sum(self._each_chunk(part))
+        return sum(self._each_run(lambda run: sum(of(chunk) for chunk in run)))
 
     def forces(self, positions: FloatArray) -> FloatArray:
         """Internal forces ∂Ψ/∂x (n, 3) in mN."""
 
-        def part(chunk: _Chunk) -> FloatArray:
-            gradients = self._gradients(positions, chunk.elements)
-            stress = chunk.law.stress(gradients.reshape(-1, 3, 3), chunk.material).reshape(gradients.shape)
-            parts = _element_forces(stress, self._quadrature.gradients, self._quadrature.weights, chunk.elements)
-            flat = self.mesh.tetrahedra[chunk.elements].ravel()
-            count = len(positions)
-            return np.stack([np.bincount(flat, parts[:, :, i].ravel(), minlength=count) for i in range(3)], axis=1)
+        def of(run: Sequence[_Chunk]) -> FloatArray:
+            forces = np.zeros_like(positions)
+            for chunk in run:
+                gradients = self._gradients(positions, chunk.elements)
+                stress = chunk.law.stress(gradients.reshape(-1, 3, 3), chunk.material).reshape(gradients.shape)
+                _add_forces(stress, self._quadrature, self.mesh.tetrahedra, chunk.elements, forces)
+            return forces
 
-        forces: FloatArray = np.sum(self._each_chunk(part), axis=0)
+        forces: FloatArray = np.sum(self._each_run(of), axis=0)
         return forces
 
     def add_stiffness(self, positions: FloatArray, pattern: BlockPattern, blocks: FloatArray, project: bool) -> None:
@@ -94,7 +105,7 @@ class Elasticity:
                 _cut_negative(found)
             return found
 
-        self._assemble(tangents, positions, pattern, blocks)
+        self._assemble(tangents, positions, pattern, blocks, symmetric=True)
 
     def add_rest_derivative(self, positions: FloatArray, pattern: BlockPattern, blocks: FloatArray) -> None:
         """Add the derivative of the internal forces by the unloaded positions, ∂²Ψ/∂x∂X, to `blocks` (b, 3, 3).
@@ -108,7 +119,7 @@ class Elasticity:
             tangent = chunk.law.tangent(gradients, chunk.material)
             return _rest_tangents(tangent, chunk.law.stress(gradients, chunk.material), gradients)
 
-        self._assemble(tangents, positions, pattern, blocks)
+        self._assemble(tangents, positions, pattern, blocks, symmetric=False)
 
     def _assemble(
         self,
@@ -116,23 +127,29 @@ class Elasticity:
         positions: FloatArray,
         pattern: BlockPattern,
         blocks: FloatArray,
+        symmetric: bool,
     ) -> None:
         """Add Σ w ∇Nᵀ T ∇N, with T (n, 9, 9) from the deformation gradients (n, 3, 3) of a chunk."""
+        # What a core and the one before it both add to is collected apart, else they would overwrite each other.
+        ends = np.maximum.accumulate([pattern.indptr[last + 1] for _, last in self._node_ranges])
+        firsts = [int(pattern.indptr[first]) for first, _ in self._node_ranges]
+        shared = list(zip(firsts, [0, *ends[:-1].tolist()], strict=True))
 
-        def part(chunk: _Chunk) -> FloatArray:
-            found = tangents(self._gradients(positions, chunk.elements).reshape(-1, 3, 3), chunk)
-            weights = self._quadrature.weights[chunk.elements]
-            stiffness: FloatArray = _element_stiffness(found, self._quadrature.gradients, weights, chunk.elements)
-            return stiffness
+        def add(run: Sequence[_Chunk], first: int, end: int) -> FloatArray:
+            apart = np.zeros((max(end - first, 0), 3, 3))
+            for chunk in run:
+                found = tangents(self._gradients(positions, chunk.elements).reshape(-1, 3, 3), chunk)
+                parts = _element_stiffness(found, self._quadrature, chunk.elements, symmetric)
+                _scatter_stiffness(parts, pattern.slots, chunk.elements, blocks, apart, first, symmetric)
+            return apart
 
-        # As many chunks at a time as there are cores, so that memory stays bounded.
-        for first in range(0, len(self._chunks), _CORES):
-            chunks = self._chunks[first : first + _CORES]
-            for chunk, parts in zip(chunks, _threads.map(part, chunks), strict=True):
-                _scatter_stiffness(parts, pattern.slots, chunk.elements, blocks)
+        parts = list(_threads.map(add, self._runs, *zip(*shared, strict=True)))
+        for (first, end), apart in zip(shared, parts, strict=True):
+            if len(apart):
+                blocks[first:end] += apart
 
-    def _each_chunk(self, work: Callable[[_Chunk], T]) -> list[T]:
-        return list(_threads.map(work, self._chunks))
+    def _each_run(self, work: Callable[[Sequence[_Chunk]], T]) -> list[T]:
+        return list(_threads.map(work, self._runs))
 
     def _gradients(self, positions: FloatArray, elements: IntArray) -> FloatArray:
         result: FloatArray = _deformation_gradients(
@@ -159,31 +176,33 @@ def _deformation_gradients(
 
 
 @njit(cache=True, nogil=True)
-def _element_forces(stress: FloatArray, gradients: FloatArray, weights: FloatArray, elements: IntArray) -> FloatArray:
-    points, size = gradients.shape[1], gradients.shape[2]
-    result = np.zeros((len(elements), size, 3))
+def _add_forces(
+    stress: FloatArray, quadrature: ElementQuadrature, tetrahedra: IntArray, elements: IntArray, forces: FloatArray
+) -> None:
+    gradients, weights = quadrature
     for n in range(len(elements)):
         e = elements[n]
-        for q in range(points):
-            for a in range(size):
+        for q in range(gradients.shape[1]):
+            for a in range(gradients.shape[2]):
+                node = tetrahedra[e, a]
                 for i in range(3):
                     value = 0.0
                     for j in range(3):
                         value += stress[n, q, i, j] * gradients[e, q, a, j]
-                    result[n, a, i] += weights[e, q] * value
-    return result
+                    forces[node, i] += weights[e, q] * value
 
 
 @njit(cache=True, nogil=True)
 def _element_stiffness(
-    tangents: FloatArray, gradients: FloatArray, weights: FloatArray, elements: IntArray
+    tangents: FloatArray, quadrature: ElementQuadrature, elements: IntArray, symmetric: bool
 ) -> FloatArray:
-    """Sum w ∇Nᵀ A ∇N of each element as (k, nodes, nodes, 3, 3)."""
+    """Sum w ∇Nᵀ A ∇N of each element as (k, nodes, nodes, 3, 3); where `symmetric` only its rows a ≤ b are filled."""
+    gradients, weights = quadrature
     points, size = gradients.shape[1], gradients.shape[2]
     result = np.zeros((len(elements), size, size, 3, 3))
+    half = np.zeros((3, 3, 3))
     for n in range(len(elements)):
         e = elements[n]
-        half = np.zeros((3, 3, 3))
         for q in range(points):
             tangent = tangents[n * points + q]
             for b in range(size):
@@ -193,8 +212,8 @@ def _element_stiffness(
                             value = 0.0
                             for m in range(3):
                                 value += tangent[3 * i + j, 3 * k + m] * gradients[e, q, b, m]
-                            half[i, j, k] = weights[n, q] * value
-                for a in range(size):
+                            half[i, j, k] = weights[e, q] * value
+                for a in range(b + 1 if symmetric else size):
                     for i in range(3):
                         for k in range(3):
                             value = 0.0
@@ -205,14 +224,30 @@ def _element_stiffness(
 
 
 @njit(cache=True, nogil=True)
-def _scatter_stiffness(parts: FloatArray, slots: IntArray, elements: IntArray, blocks: FloatArray) -> None:
+def _scatter_stiffness(
+    parts: FloatArray,
+    slots: Index,
+    elements: IntArray,
+    blocks: FloatArray,
+    apart: FloatArray,
+    first: int,
+    symmetric: bool,
+) -> None:
+    """Add to `blocks`, or to `apart` where the slot lies in its range from `first` on."""
+    end = first + len(apart)
     for n in range(len(elements)):
         for a in range(parts.shape[1]):
             for b in range(parts.shape[2]):
                 slot = slots[elements[n], a, b]
-                for i in range(3):
-                    for j in range(3):
-                        blocks[slot, i, j] += parts[n, a, b, i, j]
+                target = apart[slot - first] if first <= slot < end else blocks[slot]
+                if symmetric and a > b:
+                    for i in range(3):
+                        for j in range(3):
+                            target[i, j] += parts[n, b, a, j, i]
+                else:
+                    for i in range(3):
+                        for j in range(3):
+                            target[i, j] += parts[n, a, b, i, j]
 
 
 @njit(cache=True, nogil=True)

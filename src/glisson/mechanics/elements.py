@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -13,8 +14,7 @@ from glisson.geometry.shape_functions import shape_slopes, shape_values
 _OUTER = (5.0 - np.sqrt(5.0)) / 20.0  # of the four-point rule of degree 2 (Keast 1986)
 
 
-@dataclass(frozen=True, eq=False)
-class ElementQuadrature:
+class ElementQuadrature(NamedTuple):
     """∂N/∂X at the quadrature points (m, q, nodes, 3) in 1/mm and weights (m, q) in mm³."""
 
     gradients: FloatArray

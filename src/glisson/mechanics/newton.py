@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_matrix
 
 from glisson.core.arrays import FloatArray
 from glisson.core.status import Status
@@ -12,7 +11,7 @@ from glisson.mechanics.body import Balance, Body, LoadState
 from glisson.mechanics.condenser import CondensedStep, Condenser
 from glisson.mechanics.contact import Touch
 from glisson.mechanics.free_motion import find_free_motion
-from glisson.mechanics.linear_solvers import Factorisation
+from glisson.mechanics.linear_solvers import LinearSolver
 from glisson.mechanics.unsymmetric import solve_near_symmetric
 
 _ARMIJO = 1e-4
@@ -25,6 +24,9 @@ _RENEWALS = 12  # iterations of a rough solution in which points that leave lose
 _PATCHED_HALVINGS = 6
 _LONGEST_PAUSE = 7  # iterations between attempts at exact contact that failed
 _INNER_TOLERANCE = 0.1  # of the outer one
+_FIRST_ACCURACY = 0.1  # of the first-order answer to a load step
+_LOOSEST = 0.1  # accuracy of a Newton step
+_ENOUGH = 0.3  # of the tolerance, for what the last step leaves
 _LOOSE_STEPS = 8  # steps in a row of a body that nothing holds, before its free motion is looked for
 
 
@@ -60,11 +62,11 @@ class _Direction:
 
 
 class Newton:
-    """Minimises the potential of a body; keeps the factorisation's analysis over calls."""
+    """Minimises the potential of a body; keeps what its solver found out over calls."""
 
-    def __init__(self, body: Body, factorisation: Factorisation, settings: NewtonSettings) -> None:
+    def __init__(self, body: Body, solver: LinearSolver, settings: NewtonSettings) -> None:
         self._body = body
-        self._factorisation = factorisation
+        self._solver = solver
         self._condenser = Condenser(body)
         self._inner_tolerance = _INNER_TOLERANCE * settings.tolerance
         self._settings = settings
@@ -78,6 +80,7 @@ class Newton:
         body, settings = self._body, self._settings
         tolerance = settings.tolerance if tolerance is None else tolerance
         loose_steps = waits = pause = 0
+        before = np.inf
         for iteration in range(settings.iteration_limit + 1):
             if tolerance > settings.tolerance and iteration < _RENEWALS:
                 body.renew_cohesion(positions)
@@ -96,7 +99,8 @@ class Newton:
                 waits = pause
             else:
                 waits -= 1
-            direction = self._direction(positions, touches, balance.unbalanced)
+            accuracy = self._accuracy(balance.residual, before, tolerance)
+            direction, before = self._direction(positions, touches, balance.unbalanced, accuracy), balance.residual
             if direction is None:
                 return self._ended(positions, Status.STAGNATED, iteration, balance)
             moved = self._coupled(positions, touches, balance, direction)
@@ -112,7 +116,7 @@ class Newton:
 
     def close(self) -> None:
         """Give the factors' memory back."""
-        self._factorisation.close()
+        self._solver.close()
         self._condenser.close()
 
     def is_exact(self, end: NewtonEnd) -> bool:
@@ -122,25 +126,36 @@ class Newton:
     def advance(self, positions: FloatArray, goal: LoadState) -> FloatArray | None:
         """First-order answer (n, 3) to other tools and loads, which become the body's; None where there is none.
 
-        The organ goes along with moving tools instead of being overrun by them; while they stand still, an
-        organ without an answer stays where it is.
+        The organ goes along with moving tools and carried parts instead of being overrun by them; while they
+        stand still, an organ without an answer stays where it is.
         """
         body = self._body
         body.renew_cohesion(positions)
         touches = body.touches(positions)
         balance = body.balance(positions, touches)
-        change = np.where(body.fixed, 0.0, goal.external - body.external)
+        change, carried = goal.external - body.external, goal.carried - body.carried
+        if carried.any():
+            change = change - self._pull(positions, touches, carried)
+        change = np.where(body.fixed, 0.0, change)
         patch = self._condenser.patch(positions, goal.tools.angles)
         if patch is None:
-            direction = self._direction(positions, touches, balance.unbalanced + change)
+            forces = balance.unbalanced + change
+            direction = self._direction(positions, touches, forces, _FIRST_ACCURACY)
             step = None if direction is None else direction.step
         else:
             answer = self._condenser.step(patch, positions, touches, balance, change, goal.tools, self._inner_tolerance)
             step = None if answer is None else answer.step
-        if step is None and goal.tools.angles != body.loading.tools.angles:
+        if step is None and (goal.tools.angles != body.loading.tools.angles or carried.any()):
             return None
         body.loading = goal
-        return positions if step is None else positions + step
+        return positions if step is None else positions + step + carried
+
+    def _pull(self, positions: FloatArray, touches: Sequence[Touch], carried: FloatArray) -> FloatArray:
+        """Forces (n, 3) in mN with which the body resists the motion (n, 3) of what is carried."""
+        body = self._body
+        blocks = body.stiffness(positions, touches, project=False)
+        pull: FloatArray = (body.matrix(blocks) @ carried.ravel()).reshape(carried.shape)
+        return pull
 
     def _patched(self, positions: FloatArray, touches: Sequence[Touch], balance: Balance) -> FloatArray | None:
         """Newton's step with exact contact at moving tools; None where there are none or that does not pay."""
@@ -177,7 +192,14 @@ class Newton:
         longest = float(np.linalg.norm(direction, axis=1).max())
         return min(1.0, self._longest_step_mm / longest) if longest > 0.0 else 1.0
 
-    def _direction(self, positions: FloatArray, touches: Sequence[Touch], forces: FloatArray) -> _Direction | None:
+    def _accuracy(self, residual: float, before: float, tolerance: float) -> float:
+        """How exactly a step is worth solving for, as the residual fell (Eisenstat and Walker 1996, choice 2)."""
+        wanted = min(_LOOSEST, 0.9 * (residual / before) ** 2) if np.isfinite(before) else _LOOSEST
+        return max(wanted, _ENOUGH * tolerance / residual)
+
+    def _direction(
+        self, positions: FloatArray, touches: Sequence[Touch], forces: FloatArray, accuracy: float
+    ) -> _Direction | None:
         """Newton's direction; the stiffness is made definite only when Cholesky refuses the exact one.
 
         A body that would fly away is first glued to the tools it nearly touches, until their pressure, and with
@@ -186,22 +208,19 @@ class Newton:
         body = self._body
         for project in (False, True):
             blocks = body.stiffness(positions, touches, project)
-            direction = self._solved(body.upper(blocks), forces)
+            direction = self._solved(positions, blocks, forces, accuracy)
             if direction is not None:
                 break
         if direction is not None and self._allowed_share(direction) == 1.0:
             return _Direction(direction, held=True, blocks=None if project else blocks)
         body.add_bonds(positions, blocks)
-        upper = body.upper(blocks)
-        glued = self._solved(upper, forces)
+        glued = self._solved(positions, blocks, forces, accuracy)
         if glued is not None:
             return _Direction(self._allowed_share(glued) * glued, held=False)
         # A motion without stiffness is left: a small spring on every unknown keeps the step finite.
-        diagonal = upper.diagonal()
         for share in (1e-8, 1e-6, 1e-4, 1e-2):
-            shifted = upper.copy()
-            shifted.setdiag(diagonal + share * diagonal.mean())
-            direction = self._solved(shifted, forces)
+            body.add_shift(share, blocks)
+            direction = self._solved(positions, blocks, forces, accuracy)
             if direction is not None:
                 return _Direction(self._allowed_share(direction) * direction, held=False)
         return None
@@ -215,12 +234,13 @@ class Newton:
         energy: the residual judges. The direction's blocks are used up.
         """
         body = self._body
-        if direction.blocks is None or balance.residual > _COUPLED_RESIDUAL or body.law.friction == 0.0:
+        rubbing = bool(body.contacts) and body.law.friction > 0.0
+        if direction.blocks is None or balance.residual > _COUPLED_RESIDUAL or not rubbing:
             return None
         blocks = direction.blocks
         body.add_friction_by_pressure(positions, touches, blocks)
-        matrix, free = body.matrix(blocks), body.system.free
-        moved = positions + solve_near_symmetric(matrix, free, self._factorisation, balance.unbalanced)
+        step = solve_near_symmetric(body.matrix(blocks), body.system, self._solver, balance.unbalanced)
+        moved = positions + step
         if not np.isfinite(body.elasticity.energy(moved)):
             return None
         found = body.balance(moved, body.touches(moved))
@@ -229,14 +249,14 @@ class Newton:
         body.touches(positions)  # friction as it was
         return None
 
-    def _solved(self, upper: csr_matrix, forces: FloatArray) -> FloatArray | None:
+    def _solved(
+        self, positions: FloatArray, blocks: FloatArray, forces: FloatArray, accuracy: float
+    ) -> FloatArray | None:
         """The displacement (n, 3) under the forces; None where the matrix is not definite."""
-        if not self._factorisation.factor(upper):
+        if not self._solver.factor(self._body.tangent(positions, blocks)):
             return None
-        free = self._body.system.free
-        direction = np.zeros(forces.size)
-        direction[free] = self._factorisation.solve(forces.ravel()[free])
-        return direction.reshape(forces.shape) if np.isfinite(direction).all() else None
+        step = self._solver.solve(forces, accuracy)
+        return step if step is not None and np.isfinite(step).all() else None
 
     def _search(self, positions: FloatArray, direction: _Direction, balance: Balance) -> FloatArray | None:
         """Backtrack until the energy falls enough; None where no step lowers it.

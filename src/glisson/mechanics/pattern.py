@@ -1,6 +1,7 @@
 """The fixed sparsity of the stiffness: found once from the elements, filled many times."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numba import njit
@@ -8,6 +9,10 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_matrix, coo_matrix, csr_matrix
 
 from glisson.core.arrays import FloatArray, IntArray
+from glisson.mechanics.block_rows import BlockRows
+
+Index = NDArray[np.int32]
+"""Half the memory of `IntArray`: patterns are as large as the matrix itself."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,9 +23,9 @@ class BlockPattern:
     is the block number of each node pair of each element.
     """
 
-    indptr: IntArray
-    indices: IntArray
-    slots: IntArray
+    indptr: Index
+    indices: Index
+    slots: Index
 
     @property
     def block_count(self) -> int:
@@ -29,9 +34,17 @@ class BlockPattern:
 
     def add_diagonal(self, values: FloatArray, blocks: FloatArray) -> None:
         """Add to all three unknowns of each node its value (n,)."""
+        blocks[self._diagonal] += values[:, None, None] * np.eye(3)
+
+    def diagonal(self, blocks: FloatArray) -> FloatArray:
+        """The diagonal entries (n, 3)."""
+        entries: FloatArray = np.einsum("nii->ni", blocks[self._diagonal])
+        return entries
+
+    @cached_property
+    def _diagonal(self) -> IntArray:
         rows = np.repeat(np.arange(len(self.indptr) - 1), np.diff(self.indptr))
-        own = np.flatnonzero(rows == self.indices)
-        blocks[own] += values[:, None, None] * np.eye(3)
+        return np.flatnonzero(rows == self.indices)
 
     def matrix(self, blocks: FloatArray) -> bsr_matrix:
         """The matrix of block values (b, 3, 3), over all unknowns."""
@@ -45,21 +58,21 @@ def block_pattern(tetrahedra: IntArray, node_count: int) -> BlockPattern:
     columns = np.tile(tetrahedra, (1, size)).ravel()
     graph = coo_matrix((np.ones(len(rows), dtype=np.int8), (rows, columns)), (node_count, node_count)).tocsr()
     graph.sort_indices()
-    indptr, indices = graph.indptr.astype(np.int64), graph.indices.astype(np.int64)
+    indptr, indices = graph.indptr.astype(np.int32), graph.indices.astype(np.int32)
     slots = _find_slots(indptr, indices, tetrahedra, tetrahedra)
     return BlockPattern(indptr, indices, slots)
 
 
-def pair_slots(pattern: BlockPattern, nodes: IntArray) -> IntArray:
+def pair_slots(pattern: BlockPattern, nodes: IntArray) -> Index:
     """Block numbers (p, a, a) of all pairs within each row of `nodes` (p, a), which must share elements."""
-    result: IntArray = _find_slots(pattern.indptr, pattern.indices, nodes, nodes)
+    result: Index = _find_slots(pattern.indptr, pattern.indices, nodes, nodes)
     return result
 
 
 @njit(cache=True)
-def _find_slots(indptr: IntArray, indices: IntArray, rows: IntArray, columns: IntArray) -> IntArray:
+def _find_slots(indptr: Index, indices: Index, rows: IntArray, columns: IntArray) -> Index:
     count, size = rows.shape
-    slots = np.zeros((count, size, size), dtype=np.int64)
+    slots = np.zeros((count, size, size), dtype=np.int32)
     for e in range(count):
         for a in range(size):
             start, end = indptr[rows[e, a]], indptr[rows[e, a] + 1]
@@ -73,16 +86,27 @@ class FreeSystem:
 
     Args:
         pattern: the blocks.
-        fixed: (3 n,) which unknowns are held.
+        fixed: (n, 3) which unknowns are held.
     """
 
     def __init__(self, pattern: BlockPattern, fixed: NDArray[np.bool_]) -> None:
-        self.free = np.flatnonzero(~fixed)
-        number = np.full(len(fixed), -1, dtype=np.int64)
+        self.held = fixed
+        self.free = np.flatnonzero(~fixed.ravel())
+        number = np.full(fixed.size, -1, dtype=np.int64)
         number[self.free] = np.arange(len(self.free))
         self.indptr, self.indices, self._sources = _upper_triangle(
             pattern.indptr, pattern.indices, number, len(self.free)
         )
+
+    def restrict(self, field: FloatArray) -> FloatArray:
+        """The values (f,) of a nodal field (n, 3) at the free unknowns."""
+        return field.ravel()[self.free]
+
+    def extend(self, values: FloatArray) -> FloatArray:
+        """The nodal field (n, 3) with these values (f,) at the free unknowns, zero at the held ones."""
+        field = np.zeros_like(self.held, dtype=np.float64)
+        field.ravel()[self.free] = values
+        return field
 
     def matrix(self, blocks: FloatArray) -> csr_matrix:
         """Upper triangle, diagonal included, of the matrix of block values (b, 3, 3)."""
@@ -91,9 +115,39 @@ class FreeSystem:
         return csr_matrix((data, self.indices, self.indptr), (size, size))
 
 
+@dataclass(frozen=True, eq=False)
+class Stiffness:
+    """A symmetric matrix of block values (b, 3, 3) at node positions (n, 3) in mm, some unknowns being held."""
+
+    pattern: BlockPattern
+    system: FreeSystem
+    blocks: FloatArray
+    positions: FloatArray
+
+    @property
+    def held(self) -> NDArray[np.bool_]:
+        """Which unknowns (n, 3) are held."""
+        return self.system.held
+
+    @property
+    def upper(self) -> csr_matrix:
+        """Upper triangle of the free unknowns' matrix."""
+        return self.system.matrix(self.blocks)
+
+    def product(self, field: FloatArray) -> FloatArray:
+        """The forces (n, 3) on free unknowns of a nodal field (n, 3) that vanishes on the held ones."""
+        forces = self._rows.product(field).astype(np.float64, copy=False)
+        forces[self.held] = 0.0
+        return forces
+
+    @cached_property
+    def _rows(self) -> BlockRows:
+        return BlockRows(self.pattern.indptr, self.pattern.indices, self.blocks)
+
+
 @njit(cache=True)
 def _upper_triangle(
-    indptr: IntArray, indices: IntArray, number: IntArray, size: int
+    indptr: Index, indices: Index, number: IntArray, size: int
 ) -> tuple[NDArray[np.int32], NDArray[np.int32], IntArray]:
     starts = np.zeros(size + 1, dtype=np.int32)
     for node in range(len(indptr) - 1):

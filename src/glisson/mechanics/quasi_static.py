@@ -18,8 +18,9 @@ from glisson.mechanics.contact_law import Cushion
 from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.elements import SurfaceQuadrature, surface_quadrature
 from glisson.mechanics.initial_gaps import settle_gaps
-from glisson.mechanics.linear_solvers import make_factorisation
+from glisson.mechanics.linear_solvers import make_direct_solver, make_iterative_solver
 from glisson.mechanics.newton import Newton, NewtonSettings
+from glisson.mechanics.numbering import numbering
 from glisson.mechanics.rest_shape import RestShape, find_rest_shape
 from glisson.mechanics.sampling import face_parts
 from glisson.mechanics.stages import StageRunner, fixed_unknowns, gravity_forces
@@ -71,13 +72,17 @@ class QuasiStatic:
         """
         if self._parameters.element == "T10":
             model = _quadratic(model)
+        order = numbering(model.mesh.nodes)
+        return order.deformation(self._solve(order.model(model), scenario, progress), model.mesh)
+
+    def _solve(self, model: Model, scenario: Scenario, progress: Progress) -> Deformation:
         try:
             progress(0.0, "finding the unloaded shape")
             body = self._body(model, scenario)
         except StageFailed as failure:
             return Deformation(model.mesh, (), failure.status, str(failure))
         settings = NewtonSettings(self._parameters.tolerance, self._parameters.iteration_limit)
-        newton = Newton(body, make_factorisation(), settings)
+        newton = Newton(body, make_direct_solver() if body.moving else make_iterative_solver(), settings)
         try:
             return StageRunner(model, scenario, body, newton, self._parameters.step_deg, progress).run()
         finally:

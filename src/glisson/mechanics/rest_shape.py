@@ -22,8 +22,8 @@ from glisson.core.status import Status
 from glisson.mechanics.body import scatter_blocks
 from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.elements import SurfaceQuadrature, quadrature
-from glisson.mechanics.linear_solvers import Factorisation, make_factorisation
-from glisson.mechanics.pattern import FreeSystem, block_pattern, pair_slots
+from glisson.mechanics.linear_solvers import LinearSolver, make_direct_solver
+from glisson.mechanics.pattern import FreeSystem, Stiffness, block_pattern, pair_slots
 from glisson.mechanics.unsymmetric import solve_near_symmetric
 
 _TOLERANCE = 1e-8
@@ -102,23 +102,23 @@ class _InverseProblem:
         self._beds, self._surface, self._fixed = beds, surface, fixed
         self._scanned_points = surface.positions(mesh.nodes)
         self._pattern = block_pattern(mesh.tetrahedra, len(mesh.nodes))
-        self._system = FreeSystem(self._pattern, fixed.ravel())
+        self._system = FreeSystem(self._pattern, fixed)
         self._pairs = pair_slots(self._pattern, surface.nodes)
         self._share = 1.0
 
     def solve(self) -> FloatArray:
         """X by Newton's method with backtracking on the residual, the weight brought on in steps."""
         positions = np.array(self._mesh.nodes)
-        factorisation = make_factorisation()
+        solver = make_direct_solver()
         try:
             for share in _WEIGHT_SHARES:
                 self._share = share
-                positions = self._balanced(positions, factorisation)
+                positions = self._balanced(positions, solver)
         finally:
-            factorisation.close()
+            solver.close()
         return positions
 
-    def _balanced(self, positions: FloatArray, factorisation: Factorisation) -> FloatArray:
+    def _balanced(self, positions: FloatArray, solver: LinearSolver) -> FloatArray:
         """X for the present share of the weight, started from another share's."""
         force = self._unbalanced(positions)
         reference = self._share * float(np.linalg.norm(self._weights))
@@ -126,7 +126,7 @@ class _InverseProblem:
             size = float(np.linalg.norm(force))
             if size <= _TOLERANCE * reference:
                 return positions
-            step = self._step(positions, force, factorisation)
+            step = self._step(positions, force, solver)
             if step is None:
                 break
             found = self._search(positions, step, size)
@@ -161,16 +161,16 @@ class _InverseProblem:
         force[self._fixed] = 0.0
         return force
 
-    def _step(self, positions: FloatArray, force: FloatArray, factorisation: Factorisation) -> FloatArray | None:
+    def _step(self, positions: FloatArray, force: FloatArray, solver: LinearSolver) -> FloatArray | None:
         """Newton's step (n, 3); None where the forward stiffness is not definite."""
         elasticity = Elasticity(self._mesh, self._materials, positions)
         beds = self._bed_stiffness(positions)
         stiffness, derivative = beds.copy(), -beds
         elasticity.add_stiffness(self._mesh.nodes, self._pattern, stiffness, project=True)
-        if not factorisation.factor(self._system.matrix(stiffness)):
+        if not solver.factor(Stiffness(self._pattern, self._system, stiffness, self._mesh.nodes)):
             return None
         elasticity.add_rest_derivative(self._mesh.nodes, self._pattern, derivative)
-        return solve_near_symmetric(self._pattern.matrix(-derivative), self._system.free, factorisation, -force)
+        return solve_near_symmetric(self._pattern.matrix(-derivative), self._system, solver, -force)
 
     def _bed_stiffness(self, positions: FloatArray) -> FloatArray:
         """Blocks (b, 3, 3) of the beds."""

@@ -23,7 +23,7 @@ from glisson.mechanics.tools import LeverTool
 
 _SMALLEST_SHARE = 1.0 / 256.0  # of a stage: smaller load steps are not tried
 _SMALLEST_ANSWER = 1.0 / 16.0
-_LOAD_STEPS = 4  # for a change of gravity
+_LOAD_STEPS = 4  # for a change of gravity, and for a node set that is carried
 _FIRST_SHARE = 0.1  # of a full load step, for the first one: the tool only just comes to bear
 _GROWTH = 2.0
 _STIFFENINGS = 6
@@ -73,7 +73,7 @@ class StageRunner:
 
     def _run_stage(self, stage: Stage) -> NewtonEnd:
         body = self._body
-        body.hold(fixed_unknowns(self._model, stage.fixed))
+        body.hold(fixed_unknowns(self._model, stage.fixed + tuple(move.node_set for move in stage.moves)))
         if self._number == 0:
             body.law = stage.contact
         gravity = self._scenario.surgery_gravity if stage.gravity else None
@@ -87,7 +87,10 @@ class StageRunner:
             end = self._ramp(stage, self._goal(law=stage.contact))
             if end.status is not Status.CONVERGED:
                 return end
-        end = self._ramp(stage, LoadState(ToolState(tuple(angles), stage.contact), external))
+        carried = np.zeros_like(self._positions)
+        for move in stage.moves:
+            carried[self._model.node_set(move.node_set)] = move.displacement_mm
+        end = self._ramp(stage, LoadState(ToolState(tuple(angles), stage.contact), external, carried))
         for drive in stage.drives:
             if drive.force_n is not None and end.status is Status.CONVERGED:
                 end = self._lift_by_force(stage, drive.lever, millinewtons_from_newtons(drive.force_n))
@@ -98,9 +101,11 @@ class StageRunner:
         start = self._body.loading
         turn = max((abs(b - a) for a, b in zip(start.tools.angles, goal.tools.angles, strict=True)), default=0.0)
         steps = max(int(np.ceil(turn / self._step - 1e-9)), 1)
-        if np.linalg.norm(goal.external - start.external) > 1e-9 * np.linalg.norm(goal.external):
+        heavier = np.linalg.norm(goal.external - start.external) > 1e-9 * np.linalg.norm(goal.external)
+        carrying = bool(np.any(goal.carried != start.carried))
+        if heavier or carrying:
             steps = max(steps, _LOAD_STEPS)
-        done, share, may_flow = 0.0, _FIRST_SHARE / steps if turn > 0.0 else 1.0 / steps, True
+        done, share, may_flow = 0.0, _FIRST_SHARE / steps if turn > 0.0 else 1.0 / steps, not carrying
         while done < 1.0:
             reach = min(done + share, 1.0)
             self._progress((self._number + reach) / len(self._scenario.stages), self._words(stage))
@@ -125,7 +130,7 @@ class StageRunner:
         tools = ToolState(
             present.tools.angles if angles is None else tuple(angles), present.tools.law if law is None else law
         )
-        return LoadState(tools, present.external)
+        return LoadState(tools, present.external, present.carried)
 
     def _load_step(self, goal: LoadState) -> NewtonEnd:
         """Equilibrium at the goal; tools, loads and anchors are put back where it is not reached."""
@@ -135,7 +140,11 @@ class StageRunner:
         if moved is None:
             end = NewtonEnd(self._positions, Status.STAGNATED, 0, float("nan"))
         else:
-            end = self._equilibrium(self._uninverted(moved))
+            start_at = self._uninverted(moved)
+            if start_at is None:
+                end = NewtonEnd(self._positions, Status.INVERTED, 0, float("nan"))
+            else:
+                end = self._equilibrium(start_at)
         if end.status is not Status.CONVERGED:
             for contact, memory in zip(body.contacts, memories, strict=True):
                 contact.recall(memory)
@@ -182,12 +191,14 @@ class StageRunner:
             contact.recall(memory)
         return replace(end, positions=before, status=Status.ITERATION_LIMIT, iterations=iterations)
 
-    def _uninverted(self, moved: FloatArray) -> FloatArray:
-        """As much of a first-order answer as inverts no element; the tools stay where they are."""
+    def _uninverted(self, moved: FloatArray) -> FloatArray | None:
+        """As much of a first-order answer as inverts no element; None where that would leave carried parts behind."""
         step, share = moved - self._positions, 1.0
         while share > _SMALLEST_ANSWER:
             if np.isfinite(self._body.elasticity.energy(self._positions + share * step)):
                 return self._positions + share * step
+            if step[self._body.fixed].any():
+                return None
             share /= 2.0
         return self._positions
 

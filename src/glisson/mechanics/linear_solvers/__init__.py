@@ -1,25 +1,34 @@
-"""Factorisations of the symmetric stiffness; the best one that is installed is used."""
+"""Solvers for the symmetric stiffness; which one is used depends on its size and on what is installed."""
 
 from typing import Protocol
 
 from scipy.sparse import csr_matrix
 
 from glisson.core.arrays import FloatArray, IntArray
+from glisson.mechanics.linear_solvers.conjugate_gradients import ConjugateGradients
+from glisson.mechanics.linear_solvers.multigrid import Multigrid
 from glisson.mechanics.linear_solvers.pardiso import Pardiso, PardisoCondensation, pardiso_library
 from glisson.mechanics.linear_solvers.superlu import SuperLU, SuperLUCondensation
+from glisson.mechanics.pattern import Stiffness
 
 
-class Factorisation(Protocol):
+class LinearSolver(Protocol):
     """Solves with symmetric positive definite matrices that all share one sparsity pattern."""
 
-    def factor(self, upper: csr_matrix) -> bool:
-        """Factor the matrix whose upper triangle is given; False where it is not positive definite."""
+    def factor(self, matrix: Stiffness) -> bool:
+        """Take a matrix; False where it is known not to be positive definite."""
 
-    def solve(self, right: FloatArray) -> FloatArray:
-        """Solution (n,) with the last factor."""
+    def solve(self, right: FloatArray, accuracy: float) -> FloatArray | None:
+        """Field (n, 3) that is zero where held, and whose product is `right` (n, 3) up to `accuracy` of its norm.
+
+        None where the matrix turned out not to be positive definite.
+        """
+
+    def precondition(self, right: FloatArray) -> FloatArray:
+        """A rough solution (n, 3), linear and symmetric in the right-hand side (n, 3)."""
 
     def close(self) -> None:
-        """Give the factor's memory back."""
+        """Give the memory back."""
 
 
 class Condensation(Protocol):
@@ -38,9 +47,14 @@ class Condensation(Protocol):
         """Give the factor's memory back."""
 
 
-def make_factorisation() -> Factorisation:
+def make_direct_solver() -> LinearSolver:
     """MKL's PARDISO where MKL is installed, else SciPy's SuperLU (slower, and more memory)."""
     return Pardiso() if pardiso_library() is not None else SuperLU()
+
+
+def make_iterative_solver() -> LinearSolver:
+    """Conjugate gradients with multigrid."""
+    return ConjugateGradients(Multigrid())
 
 
 def make_condensation(size: int, kept: IntArray) -> Condensation:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from glisson.core.arrays import FloatArray, IntArray
+from glisson.mechanics.pattern import Stiffness
 
 _SYMMETRIC_POSITIVE_DEFINITE = 2
 _ANALYSE, _FACTOR, _SOLVE, _FORWARD, _BACKWARD, _RELEASE = 11, 22, 33, 331, 333, -1
@@ -97,16 +98,21 @@ class Pardiso:
     def __init__(self) -> None:
         self._handle = _Handle()
 
-    def factor(self, upper: csr_matrix) -> bool:
+    def factor(self, matrix: Stiffness) -> bool:
         """Factor; the analysis is repeated only when the pattern's size changed."""
-        return self._handle.factor(upper, np.zeros(1))
+        self._system = matrix.system
+        return self._handle.factor(matrix.upper, np.zeros(1))
 
-    def solve(self, right: FloatArray) -> FloatArray:
-        """Solution with the last factor."""
-        right = np.ascontiguousarray(right, dtype=np.float64)
-        solution = np.zeros_like(right)
-        self._handle.run(_SOLVE, right, solution)
-        return solution
+    def solve(self, right: FloatArray, accuracy: float) -> FloatArray:
+        """Solution (n, 3) with the last factor, as accurate as can be."""
+        free = self._system.restrict(right)
+        solution = np.zeros_like(free)
+        self._handle.run(_SOLVE, free, solution)
+        return self._system.extend(solution)
+
+    def precondition(self, right: FloatArray) -> FloatArray:
+        """The solution (n, 3)."""
+        return self.solve(right, 0.0)
 
     def close(self) -> None:
         """Release PARDISO's memory."""
