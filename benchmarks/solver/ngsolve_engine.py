@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 _ITERATION_LIMIT = 30
 _EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
-_BUBBLE = 0.25  # NGSolve's quadratic edge function at the middle of its edge
+_BUBBLE = -0.125  # NGSolve's quadratic edge function at the middle of its edge
 
 
 def _read(problem: Problem) -> ngsolve.Mesh:

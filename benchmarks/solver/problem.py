@@ -2,7 +2,7 @@
 
 Units: mm, kPa, mN (1 kPa·mm² = 1 mN). This file needs numpy only, so that every engine's environment can read it.
 
-A neo-Hookean ellipsoid about as large as a liver has its long axis along x. Nodes of its surface with x < −60 mm
+A neo-Hookean ellipsoid about as large as a liver has its long axis along x. Nodes of its surface with x < −30 mm
 are clamped; those within 20 mm of the tip (+100, 0, 0) are carried upwards (+z) by 30 mm and held there. The weight
 acts along −z. Lift and weight grow together in four equal load steps; each must reach a residual of 1e-6.
 """
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 SEMI_AXES_MM = np.array([100.0, 70.0, 50.0])
-CLAMPED_BELOW_X_MM = -60.0
+CLAMPED_BELOW_X_MM = -30.0
 PATCH_RADIUS_MM = 20.0
 LIFT_MM = 30.0
 STEPS = 4

@@ -84,7 +84,7 @@ def main(mesh: Path, displacements: list[Path]) -> list[dict[str, float]]:
     problem = load_problem(mesh)
     fields = [np.load(path)["displacement"] for path in displacements]
     residuals = [residual(problem, field) for field in fields]
-    best = fields[int(np.argmin(residuals))]
+    best = fields[int(np.nanargmin(residuals))]
     return [
         {"residual": value, "difference": relative_difference(field, best)}
         for value, field in zip(residuals, fields, strict=True)
