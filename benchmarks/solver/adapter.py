@@ -32,9 +32,7 @@ class Failed(Exception):
     """The engine gave no solution; the text says why."""
 
 
-def run(
-    engine: str, version: str, read: Callable[[Problem], Any], solve: Callable[[Problem, Any], Solution]
-) -> None:
+def run(version: str, read: Callable[[Problem], Any], solve: Callable[[Problem, Any], Solution]) -> None:
     """Warm up, solve the problem of the command line, write both files; `read` makes the engine's own mesh."""
     problem, out = load_problem(Path(sys.argv[1])), Path(sys.argv[2])
     tiny = tiny_problem(problem.order)
@@ -44,16 +42,13 @@ def run(
     start = time.perf_counter()
     solution = solve(problem, mesh)
     seconds = time.perf_counter() - start
-    write(out, engine, version, solution, seconds, before, peak_mb())
+    write(out, version, solution, seconds, before, peak_mb())
 
 
-def write(
-    out: Path, engine: str, version: str, solution: Solution, seconds: float, before_mb: float, peak: float
-) -> None:
+def write(out: Path, version: str, solution: Solution, seconds: float, before_mb: float, peak: float) -> None:
     """Write OUT.npz and OUT.json."""
     np.savez(out.with_suffix(".npz"), displacement=solution.displacement)
     values = {
-        "engine": engine,
         "version": version,
         "seconds": seconds,
         "iterations": solution.iterations,

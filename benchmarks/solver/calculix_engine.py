@@ -105,7 +105,7 @@ def _main() -> None:
         displacement = _displacement(deck.with_suffix(".rout"), len(problem.nodes))
     version = re.search(r"CalculiX Version ([\d.]+)", text)
     iterations = len(re.findall(r"^ *iteration +\d+", text, re.MULTILINE))
-    write(out, "CalculiX", version[1] if version else "", Solution(displacement, iterations), seconds, before, peak)
+    write(out, version[1] if version else "", Solution(displacement, iterations), seconds, before, peak)
 
 
 if __name__ == "__main__":

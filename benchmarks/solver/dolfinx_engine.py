@@ -6,6 +6,8 @@ import time
 from pathlib import Path
 
 import dolfinx_solver  # noqa: F401 - must come first: it loads the libraries of MPI
+
+# isort: split
 import basix.ufl
 import dolfinx
 import numpy as np
@@ -160,7 +162,7 @@ def _main() -> None:
     seconds = time.perf_counter() - start
     peak = comm.allreduce(peak_mb())
     if comm.rank == 0:
-        write(out, "DOLFINx + GAMG", dolfinx.__version__, solution, seconds, before, peak)
+        write(out, dolfinx.__version__, solution, seconds, before, peak)
 
 
 if __name__ == "__main__":

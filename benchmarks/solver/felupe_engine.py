@@ -38,4 +38,4 @@ def _solve(problem: Problem, mesh: felupe.Mesh) -> Solution:
 
 
 if __name__ == "__main__":
-    run("FElupe + PARDISO", felupe.__version__, _read, _solve)
+    run(felupe.__version__, _read, _solve)

@@ -80,4 +80,4 @@ def _solve(problem: Problem, mesh: mfem.Mesh) -> Solution:
 
 
 if __name__ == "__main__":
-    run("PyMFEM + PARDISO", version("mfem"), _read, _solve)
+    run(version("mfem"), _read, _solve)

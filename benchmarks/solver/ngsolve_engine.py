@@ -105,4 +105,4 @@ def _nodal(problem: Problem, coefficients: np.ndarray) -> np.ndarray:
 
 if __name__ == "__main__":
     ngsolve.SetNumThreads(2)
-    run("NGSolve", ngsolve.__version__, _read, _solve)
+    run(ngsolve.__version__, _read, _solve)

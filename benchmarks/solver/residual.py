@@ -1,4 +1,4 @@
-"""The neutral judge: `python residual.py MESH REFERENCE DISPLACEMENT…` prints one JSON list with a row for each.
+"""The neutral judge: `python residual.py MESH OUT DISPLACEMENT…` writes a JSON list with an entry for each.
 
 The residual of any engine's displacement, by numpy alone and no engine's code: the forces of the law in `problem.py`
 on straight T4 (one quadrature point) or T10 (four points, degree 2, the rule that all engines are given).
@@ -46,9 +46,10 @@ def stress(deformation: NDArray[np.float64]) -> NDArray[np.float64]:
     volume = np.linalg.det(deformation)[..., None, None]
     inverse = np.swapaxes(np.linalg.inv(deformation), -1, -2)
     first = np.sum(deformation**2, axis=(-2, -1))[..., None, None]
-    return SHEAR_KPA * volume ** (-2.0 / 3.0) * (deformation - first / 3.0 * inverse) + BULK_KPA * (
-        volume - 1.0
-    ) * volume * inverse
+    return (
+        SHEAR_KPA * volume ** (-2.0 / 3.0) * (deformation - first / 3.0 * inverse)
+        + BULK_KPA * (volume - 1.0) * volume * inverse
+    )
 
 
 def relative_difference(displacement: NDArray[np.float64], reference: NDArray[np.float64]) -> float:
@@ -79,17 +80,20 @@ def _shapes(points: NDArray[np.float64], order: int) -> tuple[NDArray[np.float64
     return values, np.concatenate([corners, middles], axis=1)
 
 
-def main(mesh: Path, displacements: list[Path]) -> list[dict[str, float]]:
-    """Residual of each displacement, and its difference to the one with the smallest residual."""
-    problem = load_problem(mesh)
-    fields = [np.load(path)["displacement"] for path in displacements]
+def judge(problem: Problem, fields: list[NDArray[np.float64]]) -> list[dict[str, float | int | None]]:
+    """Of each displacement its unknowns, its residual, and its difference to the one with the smallest residual."""
     residuals = [residual(problem, field) for field in fields]
-    best = fields[int(np.nanargmin(residuals))]
+    best = fields[int(np.argmin(np.nan_to_num(residuals, nan=np.inf)))]
     return [
-        {"residual": value, "difference": relative_difference(field, best)}
+        {
+            "dofs": 3 * int(problem.free.sum()),
+            "residual": value if np.isfinite(value) else None,
+            "difference": relative_difference(field, best) if np.isfinite(field).all() else None,
+        }
         for value, field in zip(residuals, fields, strict=True)
     ]
 
 
 if __name__ == "__main__":
-    print(json.dumps(main(Path(sys.argv[1]), [Path(name) for name in sys.argv[2:]])))
+    displacements = [np.load(name)["displacement"] for name in sys.argv[3:]]
+    Path(sys.argv[2]).write_text(json.dumps(judge(load_problem(Path(sys.argv[1])), displacements)))

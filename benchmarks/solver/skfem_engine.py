@@ -96,4 +96,4 @@ def _solve(problem: Problem, mesh: skfem.MeshTet) -> Solution:
 
 
 if __name__ == "__main__":
-    run("scikit-fem + PARDISO", skfem.__version__, _read, _solve)
+    run(skfem.__version__, _read, _solve)

@@ -31,6 +31,7 @@ COMMANDS = {
     "navigate": "tell where tumours, planes and volumes are now (runs the stages before it where they are out of date)",
     "report": "write the report (runs the stages before it where they are out of date)",
     "run": "bring a case up to date, from the scan to the report",
+    "benchmark": "measure Glisson beside other engines (in a checkout; make bench installs them)",
     "techniques": "list the techniques of each kind, with the package that offers them",
     "doctor": "check the installation and say what is missing",
 }

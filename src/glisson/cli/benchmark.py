@@ -1,0 +1,64 @@
+"""`glisson benchmark`: measures Glisson beside others; the scripts are in a checkout's `benchmarks/`."""
+
+import argparse
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from itertools import groupby
+from pathlib import Path
+
+from glisson.cli.command import Command
+from glisson.cli.console import Answer
+from glisson.cli.progress import StageLines
+from glisson.framework.solver_benchmark import RESULTS, Row, SolverBenchmark
+from glisson.framework.solver_plot import PLOT, draw_cost
+
+_OURS = "Glisson"
+_HEADING = "  engine                  seconds  ratio  its     MB  residual difference"
+
+
+def _add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "benchmark",
+        choices=("solver",),
+        help="solver: the same hyperelastic problem on the same meshes by Glisson and by other engines",
+    )
+    parser.add_argument("--quick", action="store_true", help="one small problem instead of all; about a minute")
+    parser.add_argument("--out", metavar="DIR", help="where results go (default: studies/benchmark-NAME)")
+
+
+def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
+    out = Path(arguments.out or f"studies/benchmark-{arguments.benchmark}")
+    rows = SolverBenchmark(out, arguments.quick, lines).run()
+    draw_cost(rows, out / PLOT)
+    text = [*_tables(rows), f"results   {out / RESULTS} and {out / PLOT}"]
+    return Answer({"rows": [asdict(row) for row in rows]}, "\n".join(text))
+
+
+def _tables(rows: Sequence[Row]) -> Iterator[str]:
+    """A table for each mesh, fastest first; ratios are to the fastest other engine."""
+    for (element, elements), group in groupby(rows, lambda row: (row.element, row.elements)):
+        measured = sorted(group, key=lambda row: (row.seconds is None, row.seconds or 0.0))
+        peers = [row.seconds for row in measured if row.seconds is not None and row.engine != _OURS]
+        yield f"{elements:,} {element}"
+        yield _HEADING
+        yield from (f"  {_line(row, peers[0] if peers else None)}" for row in measured)
+
+
+def _line(row: Row, fastest: float | None) -> str:
+    if row.seconds is None:
+        return f"{row.engine:22s} {'–':>8s}  {row.reason}"
+    ratio = "–" if fastest is None else f"{row.seconds / fastest:.2f}"
+    memory, residual, difference = row.memory_mb or 0.0, row.residual or 0.0, row.difference or 0.0
+    return (
+        f"{row.engine:22s} {row.seconds:8.2f} {ratio:>6s} {row.iterations or '–':>4} {memory:6.0f} "
+        f"{residual:9.1e} {difference:10.1e}"
+    )
+
+
+COMMAND = Command(
+    "benchmark",
+    "  glisson benchmark solver --quick\n  glisson benchmark solver --json > solver.json",
+    _add_arguments,
+    _run,
+    ("rows",),
+)

@@ -1,0 +1,54 @@
+"""Cost against size: seconds and memory of each engine over the number of elements, with the fitted exponent."""
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+
+from glisson.framework.solver_benchmark import Row
+from glisson.io.atomic import atomic_path
+
+PLOT = "cost.png"
+
+
+def fitted_exponent(sizes: Sequence[float], costs: Sequence[float]) -> float | None:
+    """Exponent p of the least-squares fit cost = c · sizeᵖ in logarithms; None for fewer than two sizes."""
+    if len(set(sizes)) < 2:
+        return None
+    return float(np.polyfit(np.log(sizes), np.log(costs), 1)[0])
+
+
+def draw_cost(rows: Iterable[Row], path: Path) -> None:
+    """Write the plot as PNG."""
+    curves: dict[tuple[str, str], list[Row]] = defaultdict(list)
+    for row in rows:
+        if row.seconds is not None:
+            curves[row.engine, row.element].append(row)
+    figure, (left, right) = plt.subplots(1, 2, figsize=(13.0, 5.5), layout="constrained")
+    engines = list(dict.fromkeys(engine for engine, _ in curves))
+    for (engine, element), measured in curves.items():
+        style = {"color": f"C{engines.index(engine)}", "linestyle": "-" if element == "T4" else "--", "marker": "o"}
+        sizes = [float(row.elements) for row in measured]
+        _curve(left, f"{engine}, {element}", sizes, [float(row.seconds or 0.0) for row in measured], style)
+        _curve(right, f"{engine}, {element}", sizes, [float(row.memory_mb or 0.0) for row in measured], style)
+    for axes, title, unit in ((left, "Whole solve", "seconds"), (right, "Largest memory of the process", "MB")):
+        axes.set(title=title, xlabel="elements", ylabel=unit, xscale="log", yscale="log")
+        axes.grid(alpha=0.3)
+    if curves:
+        left.legend(fontsize="small", title="exponent of size")
+        right.legend(fontsize="small", title="exponent of size")
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, dpi=120)
+    plt.close(figure)
+
+
+def _curve(axes: Axes, name: str, sizes: list[float], costs: list[float], style: dict[str, str]) -> None:
+    exponent = fitted_exponent(sizes, costs)
+    label = name if exponent is None else f"{name}: {exponent:.2f}"
+    axes.plot(sizes, costs, label=label, markersize=4.0, **style)  # type: ignore[arg-type]
