@@ -4,11 +4,12 @@ VENV := .venv
 BIN := $(VENV)/bin
 DEMO_OUT ?= demo
 
-.PHONY: help demo test check lock clean
+.PHONY: help demo test bench check lock clean
 
 help:
 	@echo "make demo    run the whole way on the embedded phantom; writes $(DEMO_OUT)/results/report.html"
 	@echo "make test    run the tests"
+	@echo "make bench   measure the solver beside other engines; makes their environments first (about 2.5 GB, once)"
 	@echo "make check   ruff, mypy --strict, import contracts"
 	@echo "make lock    renew requirements.lock from pyproject.toml"
 
@@ -28,6 +29,10 @@ demo: $(VENV)/.ready
 test: $(VENV)/.ready
 	$(BIN)/python -m pytest
 
+bench: $(VENV)/.ready
+	PYTHON=$(PYTHON) UV=$(BIN)/uv bash benchmarks/environments.sh
+	$(BIN)/glisson benchmark solver
+
 check: $(VENV)/.ready
 	$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/mypy && $(BIN)/lint-imports
 
@@ -38,4 +43,4 @@ lock:
 		--generate-hashes --no-emit-index-url --no-header pyproject.toml -o requirements.lock
 
 clean:
-	rm -rf $(VENV) demo studies
+	rm -rf $(VENV) .venv-bench .venv-dolfinx demo studies

@@ -82,15 +82,16 @@ def _shapes(points: NDArray[np.float64], order: int) -> tuple[NDArray[np.float64
 
 def judge(problem: Problem, fields: list[NDArray[np.float64]]) -> list[dict[str, float | int | None]]:
     """Of each displacement its unknowns, its residual, and its difference to the one with the smallest residual."""
-    residuals = [residual(problem, field) for field in fields]
-    best = fields[int(np.argmin(np.nan_to_num(residuals, nan=np.inf)))]
+    finite = [bool(np.isfinite(field).all()) for field in fields]
+    residuals = [residual(problem, field) if known else np.inf for field, known in zip(fields, finite, strict=True)]
+    best = fields[int(np.argmin(residuals))]
     return [
         {
             "dofs": 3 * int(problem.free.sum()),
-            "residual": value if np.isfinite(value) else None,
-            "difference": relative_difference(field, best) if np.isfinite(field).all() else None,
+            "residual": value if known else None,
+            "difference": relative_difference(field, best) if known else None,
         }
-        for value, field in zip(residuals, fields, strict=True)
+        for field, known, value in zip(fields, finite, residuals, strict=True)
     ]
 
 

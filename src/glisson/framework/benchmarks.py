@@ -47,7 +47,7 @@ def run_script(command: Sequence[str], log: Path, time_limit_s: float, progress:
             while process.poll() is None:
                 seconds = time.monotonic() - start
                 if seconds > time_limit_s:
-                    return f"no answer within {time_limit_s:.0f} s"
+                    return f"no answer within {time_limit_s:g} s"
                 progress(None, f"{words}, {seconds:.0f} s")
                 time.sleep(_POLL_S)
         finally:

@@ -10,6 +10,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import NullFormatter, StrMethodFormatter
 
 from glisson.framework.solver_benchmark import Row
 from glisson.io.atomic import atomic_path
@@ -39,10 +40,12 @@ def draw_cost(rows: Iterable[Row], path: Path) -> None:
         _curve(right, f"{engine}, {element}", sizes, [float(row.memory_mb or 0.0) for row in measured], style)
     for axes, title, unit in ((left, "Whole solve", "seconds"), (right, "Largest memory of the process", "MB")):
         axes.set(title=title, xlabel="elements", ylabel=unit, xscale="log", yscale="log")
-        axes.grid(alpha=0.3)
-    if curves:
-        left.legend(fontsize="small", title="exponent of size")
-        right.legend(fontsize="small", title="exponent of size")
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_formatter(StrMethodFormatter("{x:,g}"))
+            axis.set_minor_formatter(NullFormatter())
+        axes.grid(alpha=0.3, which="both")
+        if curves:
+            axes.legend(fontsize="small", title="and exponent of size")
     with atomic_path(path) as temporary:
         figure.savefig(temporary, dpi=120)
     plt.close(figure)
