@@ -3,6 +3,7 @@
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 
@@ -16,6 +17,14 @@ from glisson.framework.solver_benchmark import Row
 from glisson.io.atomic import atomic_path
 
 PLOT = "cost.png"
+_LEGEND: dict[str, Any] = {
+    "title": "engine, element: exponent of size",
+    "fontsize": "small",
+    "frameon": False,
+    "ncols": 2,
+    "loc": "upper center",
+    "bbox_to_anchor": (0.5, -0.1),
+}
 
 
 def fitted_exponent(sizes: Sequence[float], costs: Sequence[float]) -> float | None:
@@ -31,7 +40,7 @@ def draw_cost(rows: Iterable[Row], path: Path) -> None:
     for row in rows:
         if row.seconds is not None:
             curves[row.engine, row.element].append(row)
-    figure, (left, right) = plt.subplots(1, 2, figsize=(13.0, 5.5), layout="constrained")
+    figure, (left, right) = plt.subplots(1, 2, figsize=(13.0, 7.5), layout="constrained")
     engines = list(dict.fromkeys(engine for engine, _ in curves))
     for (engine, element), measured in curves.items():
         style = {"color": f"C{engines.index(engine)}", "linestyle": "-" if element == "T4" else "--", "marker": "o"}
@@ -45,7 +54,7 @@ def draw_cost(rows: Iterable[Row], path: Path) -> None:
             axis.set_minor_formatter(NullFormatter())
         axes.grid(alpha=0.3, which="both")
         if curves:
-            axes.legend(fontsize="small", title="and exponent of size")
+            axes.legend(**_LEGEND)
     with atomic_path(path) as temporary:
         figure.savefig(temporary, dpi=120)
     plt.close(figure)
