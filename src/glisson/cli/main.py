@@ -31,6 +31,7 @@ COMMANDS = {
     "navigate": "tell where tumours, planes and volumes are now (runs the stages before it where they are out of date)",
     "report": "write the report (runs the stages before it where they are out of date)",
     "run": "bring a case up to date, from the scan to the report",
+    "study": "compute many points, each once, and tell what they say together",
     "techniques": "list the techniques of each kind, with the package that offers them",
     "doctor": "check the installation and say what is missing",
 }
@@ -85,7 +86,7 @@ def _failure(error: BaseException, stage: str | None, command: Command | None) -
     message = str(error)
     if isinstance(error, KeyboardInterrupt):
         where = "" if stage is None else f" in the stage {stage}; the case is as it was before that stage"
-        message, exit_code = f"Interrupted{where}.", _INTERRUPTED
+        message, exit_code = message or f"Interrupted{where}.", _INTERRUPTED
     elif isinstance(error, StageFailed):
         status = error.status
     elif isinstance(error, GlissonError):

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 from glisson.framework.pipeline import Listener
 from glisson.io.atomic import atomic_path
@@ -32,7 +32,7 @@ class Conclusion:
 class Study(Protocol):
     """Points and what they tell. Preparations are points, too: meshes and truths that others go on with."""
 
-    name: str
+    name: ClassVar[str]
 
     def preparations(self) -> Sequence[Point]:
         """What must be there before."""
