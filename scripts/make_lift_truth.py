@@ -18,10 +18,9 @@ import time
 from pathlib import Path
 
 import numpy as np
-from skimage.measure import marching_cubes
 
 from glisson.core.arrays import FloatArray, IntArray
-from glisson.core.mesh import TetMesh, TriangleSurface
+from glisson.core.mesh import TetMesh
 from glisson.core.scenario import Board, Lever
 from glisson.core.units import STANDARD_GRAVITY_MM_S2, density_from_kg_m3, radians
 from glisson.phantom.calculix.lift_deck import LiftOrgan, LiftSettings, LiftSteps, with_middles, write_lift_deck
@@ -33,6 +32,7 @@ from glisson.phantom.implicit import Solid
 from glisson.phantom.lever_lift import LEVER_ANGLE_DEG, lever_lift
 from glisson.phantom.lift_truths import LIFT_TRUTHS, LiftTruth, lift_truth
 from glisson.phantom.scan import Anatomy
+from glisson.phantom.solid_surface import solid_surface
 from glisson.phantom.truth import write_truth
 from glisson.phantom.truth_checks import (
     gap_to_lever,
@@ -49,22 +49,11 @@ ATTACHMENT = DirectionAttachment(reach=0.25, left_limit=0.5)
 """The models under test take 0.3 and 0.55."""
 
 
-def surface_of(solid: Solid, step_mm: float) -> TriangleSurface:
-    """The zero level of a solid by marching cubes."""
-    low, high = solid.bounds[0] - 3.0 * step_mm, solid.bounds[1] + 3.0 * step_mm
-    count = np.ceil((high - low) / step_mm).astype(int) + 1
-    axes = [low[a] + step_mm * np.arange(count[a]) for a in range(3)]
-    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    vertices, triangles, _, _ = marching_cubes(solid.distance(grid), 0.0, spacing=(step_mm,) * 3)  # type: ignore[no-untyped-call]
-    surface = TriangleSurface(vertices + low, triangles)
-    return surface if surface.volume_mm3 > 0.0 else TriangleSurface(surface.vertices, triangles[:, ::-1])
-
-
 def rest_mesh(anatomy: Anatomy, edge_mm: float, folder: Path) -> TetMesh:
     """T10 mesh of the rest shape, kept in `folder`."""
     kept = folder / f"mesh{edge_mm:g}.npz"
     if not kept.is_file():
-        surface = surface_of(anatomy.shape.liver, 2.5)
+        surface = solid_surface(anatomy.shape.liver, 2.5)
         mesh = Mmg(MmgParameters(edge_length_mm=edge_mm, envelope_mm=edge_mm / 30.0)).mesh(surface)
         np.savez(kept, nodes=mesh.nodes.astype(np.float32), tetrahedra=mesh.tetrahedra)
         say(f"surface {surface.volume_mm3 * 1e-3:.1f} ml, mesh {mesh.volume_mm3 * 1e-3:.1f} ml")

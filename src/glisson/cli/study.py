@@ -11,11 +11,13 @@ from glisson.core.errors import BadInput
 from glisson.io.atomic import atomic_path
 from glisson.studies.dask_cluster import DaskCluster
 from glisson.studies.executor import Executor
+from glisson.studies.lift_robustness.study import LiftRobustness
 from glisson.studies.local_pool import LocalPool
 from glisson.studies.sensitivity.study import Sensitivity
 from glisson.studies.study import Study, run_study
 
 STUDIES = {
+    "lift-robustness": "whether the lever lift converges whatever liver, lever, tissue and contact",
     "sensitivity": "how much mesh, law, stiffness, compressibility and contact move the tumour's place",
 }
 
@@ -50,6 +52,9 @@ def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
 
 
 def _study(arguments: argparse.Namespace) -> Study:
+    if arguments.study == LiftRobustness.name:
+        seed = _whole_number(arguments.seed, "--seed", 0)
+        return LiftRobustness.of(arguments.quick, seed or 0)
     return Sensitivity.of(arguments.quick, arguments.long, arguments.element)
 
 

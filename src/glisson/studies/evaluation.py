@@ -66,7 +66,7 @@ def evaluate(work: Work) -> Outcome:
         raise UnfitWorker(f"A worker could not read or write: {error}.") from error
     except Exception as error:
         outcome = Outcome(status=None, message=_unforeseen(error))
-    return replace(outcome, seconds=time.perf_counter() - started)
+    return replace(outcome, seconds=round(time.perf_counter() - started, 3))
 
 
 def _unforeseen(error: Exception) -> str:

@@ -65,7 +65,7 @@ class PointStore:
             "message": outcome.message,
             "values": dict(outcome.values),
             "arrays": sorted(outcome.arrays),
-            "seconds": round(outcome.seconds, 3),
+            "seconds": outcome.seconds,
             "finished": datetime.now(UTC).isoformat(timespec="seconds"),
             "versions": {name: package_version(name) for name in KEY_PACKAGES},
         }

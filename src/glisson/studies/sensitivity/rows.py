@@ -1,7 +1,5 @@
 """The table: each model against each truth, and what each parameter does to the error."""
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -86,16 +84,6 @@ def effects(rows: Sequence[Row]) -> list[dict[str, Any]]:
                     }
                 )
     return found
-
-
-def rows_as_csv(rows: Sequence[Row]) -> bytes:
-    """The rows as a table with a header."""
-    stream = io.StringIO()
-    names = [name for name in (rows[0] if rows else ()) if name != "events"]
-    writer = csv.DictWriter(stream, names, extrasaction="ignore", lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return stream.getvalue().encode()
 
 
 def rows_as_text(rows: Sequence[Row], values: Mapping[str, Any]) -> str:

@@ -21,9 +21,10 @@ from glisson.studies.sensitivity.choices import (
     one_at_a_time,
 )
 from glisson.studies.sensitivity.figures import draw_charts
-from glisson.studies.sensitivity.rows import Truth, compared, effects, rows_as_csv, rows_as_text, truth_values
+from glisson.studies.sensitivity.rows import Truth, compared, effects, rows_as_text, truth_values
 from glisson.studies.sensitivity.tasks import CALCULIX, LIFT, MESH, TWIN, choice_inputs
 from glisson.studies.study import Conclusion
+from glisson.studies.tables import as_csv
 
 PHANTOM = "demo"
 """The liver of the study: the member of the family whose lift CalculiX has solved."""
@@ -85,7 +86,7 @@ class Sensitivity:
             "unfinished": len(self._lifts) - len(lifts),
         }
         text = rows_as_text(rows, values)
-        files = {"rows.csv": rows_as_csv(rows), **draw_charts(rows, truths, tuple(self.sizes))}
+        files = {"rows.csv": as_csv(rows, leave_out=("events",)), **draw_charts(rows, truths, tuple(self.sizes))}
         return Conclusion(values, text, files)
 
     @cached_property
