@@ -21,34 +21,15 @@ from glisson.core.status import Status
 from glisson.core.structures import Tumour
 from glisson.preoperative.mmg import Mmg, MmgParameters
 from glisson.studies import meshing
-from glisson.studies.evaluation import Work, evaluate
 from glisson.studies.lifts import rigidly_moved
 from glisson.studies.point import Outcome
 from glisson.studies.sensitivity import tasks
 from glisson.studies.sensitivity.choices import LEVELS, SIZES, SOFT, STIFF, Choice, Tissue, all_together, one_at_a_time
 from glisson.studies.sensitivity.rows import Truth, compared, effects
 from glisson.studies.sensitivity.study import Sensitivity
+from studies_in_process import InThisProcess
 
 Glisson = Callable[..., tuple[int, dict[str, Any]]]
-
-
-class InThisProcess:
-    """An executor without processes."""
-
-    capacity, threads = 1, 1
-
-    def __init__(self, size: int | None = None) -> None:
-        self._done: list[tuple[str, Outcome]] = []
-
-    def submit(self, key: str, work: Work) -> None:
-        self._done.append((key, evaluate(work)))
-
-    def finished(self, timeout: float) -> list[tuple[str, Outcome]]:
-        done, self._done = self._done, []
-        return done
-
-    def close(self) -> None:
-        pass
 
 
 def lifted(phantom: str, model: Model, element: str, friction: float, cohesion_kpa: float) -> Deformation:

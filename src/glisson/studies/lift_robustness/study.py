@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 from glisson.studies.lift_robustness.cases import LiftCase, draw_case
 from glisson.studies.lift_robustness.tasks import LIFT
+from glisson.studies.lift_robustness.telling import as_lines, as_page
 from glisson.studies.point import Outcome, Point
 from glisson.studies.study import Conclusion
 from glisson.studies.tables import as_csv
@@ -49,11 +50,13 @@ class LiftRobustness:
             "converged": len(good) / len(rows) if rows else None,
             "slipped_off": sum(row["slipped_off"] for row in good),
             "inverted": sum(row["inverted"] > 0 for row in good),
-            "penetrated": sum(row["least_gap_mm"] <= 0.0 for row in good),
+            "node_gap_mm": min((row["node_gap_mm"] for row in good), default=None),
+            "penetrated": sum(row["least_gap_mm"] is not None and row["least_gap_mm"] <= 0.0 for row in good),
             "failed": [row for row in rows if row["status"] != "converged"],
             "unfinished": len(self._lifts) - len(rows),
         }
-        return Conclusion(values, _text(values), {"rows.csv": as_csv(rows, leave_out=("events",))})
+        files = {"rows.csv": as_csv(rows, leave_out=("events",)), "report.html": as_page(values)}
+        return Conclusion(values, "\n".join(as_lines(values)), files)
 
     @cached_property
     def _lifts(self) -> list[tuple[LiftCase, Point]]:
@@ -73,21 +76,3 @@ def _row(case: LiftCase, outcome: Outcome) -> dict[str, Any]:
         **{name: outcome.values.get(name) for name in names},
         "seconds": outcome.seconds,
     }
-
-
-def _text(values: Mapping[str, Any]) -> str:
-    lines = [f"cases     {values['cases']}"]
-    if values["cases"]:
-        converged = values["cases"] - len(values["failed"])
-        lines.append(
-            f"converged {converged} ({100.0 * values['converged']:.1f} %), {values['slipped_off']} of them slipped "
-            f"off the lever; {values['inverted']} with inverted elements, {values['penetrated']} with penetration"
-        )
-    for row in values["failed"]:
-        lines.append(
-            f"failed    member {row['member']}, {row['angle_deg']:.0f}°, E {row['young_modulus_kpa']:.3g} kPa, "
-            f"ν {row['poisson_ratio']:.3f}, µ {row['friction']:.2f}, c {row['cohesion_kpa']:g} kPa: {row['message']}"
-        )
-    if values["unfinished"]:
-        lines.append(f"note      {values['unfinished']} points are not done yet; run again to go on")
-    return "\n".join(lines)

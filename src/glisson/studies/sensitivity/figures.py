@@ -1,36 +1,44 @@
 """The bar charts of the dissertation's figures II.20 to II.23: the tumour's error by mesh, for two or three levels."""
 
+from base64 import b64decode
 from collections.abc import Mapping, Sequence
-from io import BytesIO
 from typing import Any
 
 from matplotlib.axes import Axes
 
 from glisson.navigation.figures.colours import BLUE, ORANGE, SKY
-from glisson.navigation.figures.picture import DOTS_PER_INCH, new_figure
+from glisson.navigation.figures.picture import Picture, new_figure, picture
 from glisson.studies.sensitivity.choices import LEVELS, Choice
 from glisson.studies.sensitivity.rows import MILLIMETRES_PER_PIXEL, Row, Truth
 
 _CHARTS = {
-    "II-20-model": ("model", "Law"),
-    "II-21-young-modulus": ("young_modulus_kpa", "Young's modulus (kPa)"),
-    "II-22-poisson-ratio": ("poisson_ratio", "Poisson's ratio"),
-    "II-23-friction": ("friction", "Coefficient of friction"),
+    "model": ("II.20", "model", "Law"),
+    "young-modulus": ("II.21", "young_modulus_kpa", "Young's modulus (kPa)"),
+    "poisson-ratio": ("II.22", "poisson_ratio", "Poisson's ratio"),
+    "friction": ("II.23", "friction", "Coefficient of friction"),
 }
 _COLOURS = (BLUE, ORANGE, SKY)
 
 
-def draw_charts(rows: Sequence[Row], truths: Sequence[Truth], meshes: Sequence[str]) -> dict[str, bytes]:
-    """PNG of each chart by file name: a panel for each truth, mm on the left and pixels on the right.
+def draw_charts(rows: Sequence[Row], truths: Sequence[Truth], meshes: Sequence[str]) -> dict[str, Picture]:
+    """The charts by file name: a panel for each truth, mm on the left and pixels on the right.
 
     A panel's models have the truth's own parameters but for the one that is varied.
     """
     return {
-        f"figure-{name}.png": _chart(rows, truths, meshes, factor, title) for name, (factor, title) in _CHARTS.items()
+        f"figure-{number.replace('.', '-')}-{name}.png": _chart(rows, truths, meshes, factor, title, number)
+        for name, (number, factor, title) in _CHARTS.items()
     }
 
 
-def _chart(rows: Sequence[Row], truths: Sequence[Truth], meshes: Sequence[str], factor: str, title: str) -> bytes:
+def png(shown: Picture) -> bytes:
+    """A chart as a file."""
+    return b64decode(shown.source.partition(",")[2])
+
+
+def _chart(
+    rows: Sequence[Row], truths: Sequence[Truth], meshes: Sequence[str], factor: str, title: str, number: str
+) -> Picture:
     figure = new_figure(420 * len(truths) + 60, 430)
     panels = figure.subplots(1, len(truths), sharey=True, squeeze=False)[0]
     for axes, truth in zip(panels, truths, strict=True):
@@ -45,9 +53,12 @@ def _chart(rows: Sequence[Row], truths: Sequence[Truth], meshes: Sequence[str], 
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, title=title, loc="upper center", ncols=len(labels), frameon=False, fontsize=11)
     figure.subplots_adjust(left=0.07, right=0.93, bottom=0.11, top=0.77, wspace=0.06)
-    stream = BytesIO()
-    figure.savefig(stream, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
-    return stream.getvalue()
+    return picture(
+        figure,
+        f"Bars of the tumour's error for each mesh and each level of: {title}.",
+        f"Figure {number} of the dissertation: error of the tumour's centroid by mesh. {title} as shown, all other "
+        "parameters those of the truth.",
+    )
 
 
 def _panel(axes: Axes, rows: Sequence[Row], truth: Truth, meshes: Sequence[str], factor: str) -> None:
@@ -66,7 +77,13 @@ def _panel(axes: Axes, rows: Sequence[Row], truth: Truth, meshes: Sequence[str],
             else:
                 axes.text(x, 0.0, f" {words}", ha="center", va="bottom", fontsize=9.5, rotation=90, color="0.35")
         places = [place + (number - 0.5 * (len(levels) - 1)) * width for place in range(len(meshes))]
-        axes.bar(places, errors, 0.92 * width, color=_COLOURS[number], label=str(level))
+        axes.bar(
+            places,
+            errors,
+            0.92 * width,
+            color=_COLOURS[number],
+            label=level if isinstance(level, str) else f"{level:g}",
+        )
     axes.set_xticks(range(len(meshes)), [_mesh_words(rows, mesh) for mesh in meshes], fontsize=10.5)
     axes.set_title(f"against {truth.name}", fontsize=11.5)
     axes.spines[["top", "right"]].set_visible(False)

@@ -86,35 +86,6 @@ def effects(rows: Sequence[Row]) -> list[dict[str, Any]]:
     return found
 
 
-def rows_as_text(rows: Sequence[Row], values: Mapping[str, Any]) -> str:
-    """The conclusion for people: the truths, the models with the truths' own parameters, and the effects."""
-    lines = []
-    for truth in values["truths"]:
-        name = f"{truth['truth']}, {truth['young_modulus_kpa']:g} kPa"
-        if truth["uncorrected_mm"] is None:
-            lines.append(f"truth     {name}: none ({truth['message']})")
-        else:
-            lines.append(
-                f"truth     {name}: the tumour moves {truth['uncorrected_mm']:.1f} mm; "
-                f"{truth['rigid_mm']:.1f} mm remain after the best rigid motion"
-            )
-    for effect in values["effects"]:
-        if effect["median_mm"] is not None:
-            name = f"{effect['truth']}, {effect['truth_young_modulus_kpa']:g} kPa"
-            parameter = effect["parameter"].removesuffix("_kpa").replace("_", " ")
-            pixels = effect["median_mm"] / MILLIMETRES_PER_PIXEL
-            lines.append(
-                f"error     {name}: {parameter} {effect['level']}: {effect['median_mm']:.2f} mm "
-                f"({pixels:.1f} px), median of {effect['rows']}"
-            )
-    statuses = [row for row in rows if row["truth"] == rows[0]["truth"]] if rows else []
-    failed = {row["message"] for row in statuses if row["tumour_mm"] is None}
-    lines += [f"failed    {message}" for message in sorted(failed)]
-    if values["unfinished"]:
-        lines.append(f"note      {values['unfinished']} points are not done yet; run again to go on")
-    return "\n".join(lines)
-
-
 def _distance_mm(lift: Outcome, truth: Outcome) -> float | None:
     if not (lift.is_good and truth.is_good):
         return None

@@ -20,9 +20,10 @@ from glisson.studies.sensitivity.choices import (
     all_together,
     one_at_a_time,
 )
-from glisson.studies.sensitivity.figures import draw_charts
-from glisson.studies.sensitivity.rows import Truth, compared, effects, rows_as_text, truth_values
+from glisson.studies.sensitivity.figures import draw_charts, png
+from glisson.studies.sensitivity.rows import Truth, compared, effects, truth_values
 from glisson.studies.sensitivity.tasks import CALCULIX, LIFT, MESH, TWIN, choice_inputs
+from glisson.studies.sensitivity.telling import as_page, as_text
 from glisson.studies.study import Conclusion
 from glisson.studies.tables import as_csv
 
@@ -85,9 +86,13 @@ class Sensitivity:
             "converged": sum(lift.is_good for _, _, lift in lifts) / len(lifts) if lifts else None,
             "unfinished": len(self._lifts) - len(lifts),
         }
-        text = rows_as_text(rows, values)
-        files = {"rows.csv": as_csv(rows, leave_out=("events",)), **draw_charts(rows, truths, tuple(self.sizes))}
-        return Conclusion(values, text, files)
+        charts = draw_charts(rows, truths, tuple(self.sizes))
+        files = {
+            "rows.csv": as_csv(rows, leave_out=("events",)),
+            "report.html": as_page(values, list(charts.values())),
+            **{name: png(chart) for name, chart in charts.items()},
+        }
+        return Conclusion(values, as_text(values), files)
 
     @cached_property
     def _meshes(self) -> dict[str, Point]:
