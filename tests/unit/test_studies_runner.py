@@ -223,8 +223,8 @@ def test_the_forecast_is_of_costs_left(tasks, store, pool, tmp_path):
     run_points(points, store, pool, lambda fraction, words: said.append((fraction, words)))
     halfway = [words for fraction, words in said if fraction == 0.5]
     assert any("2 of 4 points, about" in words for words in halfway)
-    # Two points of cost 1 took a second or more: two of cost 1000 take a thousand times as long.
-    assert any(words.endswith("min left") for words in halfway)
+    # Two points of cost 1 took a second each: two of cost 1000, side by side, will take a thousand seconds.
+    assert any(words.endswith("about 17 min left") for words in halfway)
     assert said[-1][0] == 1.0
 
 

@@ -97,14 +97,35 @@ def test_a_row_is_the_distance_to_the_truth():
     assert [row["status"] for row in rows[::2]] == ["converged", "converged", "stagnated"]
     names = {"elements", "model", "truth", "tumour_mm", "status", "seconds", "element", *LEVELS}
     assert names <= set(rows[0])
-    found = {
-        (effect["parameter"], effect["level"]): (effect["median_mm"], effect["rows"])
-        for effect in effects(rows)
-        if effect["truth"] == "calculix"
-    }
-    assert found["friction", 0.1] == (5.0, 1)
-    assert found["model", "neo-hookean"] == (3.5, 2)
-    assert found["model", "linear-elastic"] == (None, 0)
+
+
+def test_levels_are_compared_on_the_same_models():
+    """Of an error that is a sum of contributions, each parameter's own is found, however uneven the design."""
+    base = STIFF.choice("coarse")
+    choices = [
+        base,
+        replace(base, friction=0.5),
+        replace(base, model="linear-elastic"),
+        replace(base, model="linear-elastic", young_modulus_kpa=7.0),
+        *(replace(base, young_modulus_kpa=7.0, poisson_ratio=ratio) for ratio in (0.3, 0.45)),
+    ]
+
+    def outcome(choice: Choice) -> Outcome:
+        if choice.poisson_ratio == 0.3:
+            return Outcome(status=Status.STAGNATED, message="No.")
+        error = 1.0 + (choice.friction == 0.5) + 2.0 * (choice.model != "neo-hookean")
+        return Outcome({"centroid_mm": [error + 7.0 * (choice.young_modulus_kpa == 7.0), 0.0, 0.0]})
+
+    truth = Truth("fine-t10", STIFF, Outcome({"centroid_mm": [0.0, 0.0, 0.0]}))
+    rows = compared([(choice, 4500, outcome(choice)) for choice in choices], [truth], "T10")
+    found = {(e["parameter"], e["level"]): (e["own_mm"], e["matched_mm"], e["matched"]) for e in effects(rows, [truth])}
+    # Linear and neo-Hookean are matched at both moduli: 1 and 8 against 3 and 10.
+    assert found["model", "neo-hookean"] == (1.0, 4.5, 2)
+    assert found["model", "linear-elastic"] == (3.0, 6.5, 2)
+    assert found["young_modulus_kpa", 700.0] == (1.0, 2.0, 2)
+    assert found["young_modulus_kpa", 7.0] == (8.0, 9.0, 2)
+    assert found["friction", 0.5] == (2.0, 2.0, 1)
+    assert ("poisson_ratio", 0.3) not in found
 
 
 def test_the_rigid_answer_is_exact_for_a_rigid_motion():

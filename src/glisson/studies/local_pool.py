@@ -6,11 +6,13 @@ want of memory): that point has failed, the others go on.
 
 import multiprocessing
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
+from types import FrameType
 
 from glisson.studies.evaluation import UnfitWorker, Work, evaluate
 from glisson.studies.point import Outcome
@@ -78,10 +80,11 @@ class LocalPool:
         return done
 
     def close(self) -> None:
-        """End all processes."""
+        """End all processes: those that wait for work at the end of their connection, the others at once."""
         for worker in self._workers:
             worker.connection.close()
-            worker.process.terminate()
+            if worker.key is not None:
+                worker.process.terminate()
         for worker in self._workers:
             worker.process.join(_PATIENCE_S)
             worker.process.kill()
@@ -116,8 +119,8 @@ def _interruptions_held() -> Iterator[None]:
 def _serve(connection: Connection) -> None:
     """A worker: one point after another, until nobody asks any more."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # A mesher that runs as a child of this process ends with it.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    # An exception, so that a mesher that runs as a child of this process ends with it.
+    signal.signal(signal.SIGTERM, _end)
     try:
         while True:
             work: Work = connection.recv()
@@ -126,8 +129,12 @@ def _serve(connection: Connection) -> None:
             except UnfitWorker as error:
                 answer = error
             connection.send(answer)
-    except (EOFError, BrokenPipeError, ConnectionResetError, KeyboardInterrupt):
+    except (EOFError, BrokenPipeError, ConnectionResetError):
         return
+
+
+def _end(number: int, frame: FrameType | None) -> None:
+    sys.exit(128 + number)
 
 
 def _killed(worker: _Worker) -> Outcome:

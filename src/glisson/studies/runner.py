@@ -2,7 +2,7 @@
 
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from glisson.core.protocols import Progress, silent
 from glisson.framework.lock import Claim
@@ -66,11 +66,11 @@ class _Run:
         self.done: dict[str, Outcome] = {}
         for key, point in self._all.items():
             self._take_stored(key, point)
-        self._found = frozenset(self.done)
         self._waiting = deque(key for key in self._all if key not in self.done)
         self._elsewhere: deque[str] = deque()
         self._running: dict[str, Claim] = {}
-        self._started = self._looked = time.monotonic()
+        self._begun: dict[str, float] = {}
+        self._looked = time.monotonic()
 
     @property
     def words(self) -> str:
@@ -98,6 +98,7 @@ class _Run:
             self._store.keep(self._all[key], outcome)
             self.done[key] = outcome
             self._running.pop(key).release()
+            del self._begun[key]
 
     def give_up(self) -> None:
         """End what is being computed; others may have it."""
@@ -119,7 +120,7 @@ class _Run:
             if self._take_stored(key, point):
                 claim.release()
                 continue
-            self._running[key] = claim
+            self._running[key], self._begun[key] = claim, time.monotonic()
             self._executor.submit(key, work_of(point, self._store.folder, self._executor.threads))
 
     def _look_elsewhere(self) -> None:
@@ -137,13 +138,18 @@ class _Run:
         return found is not None
 
     def _forecast(self) -> str:
-        here = [key for key in self.done if key not in self._found]
-        finished = sum(self._all[key].cost for key in here)
-        left = sum(point.cost for key, point in self._all.items() if key not in self.done)
-        if not here:
+        """How many points are done, and how long the others may take at the pace of those."""
+        spent = sum(outcome.seconds for outcome in self.done.values())
+        if spent == 0.0:
             return self.words
-        seconds = (time.monotonic() - self._started) * left / finished
-        return f"{self.words}, about {_duration(seconds)} left"
+        pace = spent / self._cost(self.done)
+        now = time.monotonic()
+        begun = sum(min(now - since, pace * self._all[key].cost) for key, since in self._begun.items())
+        left = pace * self._cost(key for key in self._all if key not in self.done) - begun
+        return f"{self.words}, about {_duration(left / self._executor.capacity)} left"
+
+    def _cost(self, keys: Iterable[str]) -> float:
+        return sum(self._all[key].cost for key in keys)
 
 
 def _duration(seconds: float) -> str:

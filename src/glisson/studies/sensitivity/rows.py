@@ -1,6 +1,6 @@
 """The table: each model against each truth, and what each parameter does to the error."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -64,26 +64,57 @@ def compared(lifts: Sequence[tuple[Choice, int, Outcome]], truths: Sequence[Trut
     ]
 
 
-def effects(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """For each truth, parameter and level the median error (mm) over all rows that have it, and their number."""
+def effects(rows: Sequence[Row], truths: Sequence[Truth]) -> list[dict[str, Any]]:
+    """What each parameter does to the error: for each truth, parameter and level two medians (mm).
+
+    `own_mm` is over the meshes, for models that have the truth's parameters otherwise (the charts' bars).
+    `matched_mm` is over all models for which there is a converged one with every other level of the
+    parameter and the same rest, `matched` in number: so that levels are compared on the same models.
+    """
     found = []
-    for kind, modulus in dict.fromkeys((row["truth"], row["truth_young_modulus_kpa"]) for row in rows):
-        against = [row for row in rows if (row["truth"], row["truth_young_modulus_kpa"]) == (kind, modulus)]
+    for truth in truths:
+        against = [row for row in rows if row["tumour_mm"] is not None and _is_against(row, truth)]
         for factor in _FACTORS:
-            for level in dict.fromkeys(row[factor] for row in against):
-                errors = [r["tumour_mm"] for r in against if r[factor] == level and r["tumour_mm"] is not None]
-                median = float(np.median(errors)) if errors else None
+            own = [row for row in against if _is_own(row, truth, factor)]
+            for level, matched in _matched(against, factor).items():
                 found.append(
                     {
-                        "truth": kind,
-                        "truth_young_modulus_kpa": modulus,
+                        "truth": truth.kind,
+                        "truth_young_modulus_kpa": truth.tissue.young_modulus_kpa,
                         "parameter": factor,
                         "level": level,
-                        "median_mm": median,
-                        "rows": len(errors),
+                        "own_mm": _median(row["tumour_mm"] for row in own if row[factor] == level),
+                        "matched_mm": _median(matched),
+                        "matched": len(matched),
                     }
                 )
     return found
+
+
+def _is_against(row: Row, truth: Truth) -> bool:
+    return (row["truth"], row["truth_young_modulus_kpa"]) == (truth.kind, truth.tissue.young_modulus_kpa)
+
+
+def _is_own(row: Row, truth: Truth, factor: str) -> bool:
+    """Whether a row's model has the truth's parameters but for one."""
+    own = truth.tissue.choice(row["mesh"]).parameters
+    return all(row[name] == value for name, value in own.items() if name != factor)
+
+
+def _matched(rows: Sequence[Row], factor: str) -> dict[Any, list[float]]:
+    """Errors by level of a parameter, of those models that are there with every level."""
+    levels = dict.fromkeys(row[factor] for row in rows)
+    families: dict[tuple[Any, ...], dict[Any, float]] = {}
+    for row in rows:
+        rest = tuple(row[name] for name in _FACTORS if name != factor)
+        families.setdefault(rest, {})[row[factor]] = row["tumour_mm"]
+    whole = [family for family in families.values() if len(family) == len(levels)]
+    return {level: [family[level] for family in whole] for level in levels}
+
+
+def _median(errors: Iterable[float]) -> float | None:
+    found = list(errors)
+    return float(np.median(found)) if found else None
 
 
 def _distance_mm(lift: Outcome, truth: Outcome) -> float | None:

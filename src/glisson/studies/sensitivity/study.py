@@ -81,7 +81,7 @@ class Sensitivity:
         values: dict[str, Any] = {
             "rows": rows,
             "truths": [truth_values(truth) for truth in truths],
-            "effects": effects(rows),
+            "effects": effects(rows, truths),
             "cases": len(lifts),
             "converged": sum(lift.is_good for _, _, lift in lifts) / len(lifts) if lifts else None,
             "unfinished": len(self._lifts) - len(lifts),
@@ -97,7 +97,7 @@ class Sensitivity:
     @cached_property
     def _meshes(self) -> dict[str, Point]:
         return {
-            name: Point(MESH, {"phantom": PHANTOM, "elements": count}, cost=float(count))
+            name: Point(MESH, {"phantom": PHANTOM, "elements": count}, cost=20.0 + count / 300.0)
             for name, count in self.sizes.items()
         }
 
@@ -112,7 +112,7 @@ class Sensitivity:
 
     def _twin(self, tissue: Tissue) -> Point:
         inputs = {"phantom": PHANTOM, "elements": self.twin_elements, "tissue": asdict(tissue)}
-        return Point(TWIN, inputs, cost=30.0 * self.twin_elements)
+        return Point(TWIN, inputs, cost=self.twin_elements / 50.0)
 
     @cached_property
     def _lifts(self) -> dict[Choice, Point]:
@@ -120,7 +120,7 @@ class Sensitivity:
             choice: Point(
                 LIFT,
                 choice_inputs(choice, PHANTOM, self.element, self._meshes[choice.mesh].key),
-                cost=self.sizes[choice.mesh] ** 1.2,
+                cost=self.sizes[choice.mesh] / 100.0,
             )
             for choice in dict.fromkeys(self._choices())
         }

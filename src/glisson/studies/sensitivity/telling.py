@@ -22,11 +22,7 @@ _COLUMNS = {
 def as_text(values: Mapping[str, Any]) -> str:
     """Truths, effects, and what failed."""
     lines = [f"truth     {sentence}" for sentence in _truth_sentences(values["truths"])]
-    for effect in _known(values["effects"]):
-        lines.append(
-            f"error     {_truth_name(effect)}: {_parameter(effect)} {effect['level']}: {effect['median_mm']:.2f} mm "
-            f"({effect['median_mm'] / MILLIMETRES_PER_PIXEL:.1f} px), median of {effect['rows']}"
-        )
+    lines += [f"error     {sentence}" for sentence in _effect_sentences(values["effects"])]
     lines += [f"failed    {sentence}" for sentence in _failures(values["rows"])]
     if values["unfinished"]:
         lines.append(f"note      {_unfinished(values)}")
@@ -43,13 +39,25 @@ def as_page(values: Mapping[str, Any], charts: Sequence[Picture]) -> bytes:
     if values["unfinished"]:
         lead.append(_unfinished(values))
     shown = [
-        [_truth_name(e), _parameter(e), str(e["level"]), number(e["median_mm"]), str(e["rows"])]
-        for e in _known(values["effects"])
+        [
+            _truth_name(e),
+            _parameter(e),
+            _level(e["level"]),
+            number(e["own_mm"]),
+            number(e["matched_mm"]),
+            str(e["matched"]),
+        ]
+        for e in values["effects"]
     ]
-    columns = ["truth", "parameter", "level", "median error (mm)", "models"]
-    effects = Table("What each parameter does: over all models that have it, whatever the others.", columns, shown)
+    columns = ["truth", "parameter", "level", "own (mm)", "matched (mm)", "models matched"]
+    effects = Table(
+        "What each parameter does. Own: median over the meshes, all other parameters those of the truth (the charts' "
+        "bars). Matched: median over all models that are there with every level of the parameter.",
+        columns,
+        shown,
+    )
     rows = [
-        [*(str(row[name]) for name in _COLUMNS), number(row["tumour_mm"]), *_pixels(row), str(row["status"])]
+        [*(_level(row[name]) for name in _COLUMNS), number(row["tumour_mm"]), *_pixels(row), str(row["status"])]
         for row in values["rows"]
     ]
     models = Table("All models.", [*_COLUMNS.values(), "error (mm)", "error (px)", "status"], rows)
@@ -70,8 +78,19 @@ def _truth_sentences(truths: Iterable[Mapping[str, Any]]) -> list[str]:
     return found
 
 
-def _known(effects: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    return [effect for effect in effects if effect["median_mm"] is not None]
+def _effect_sentences(effects: Iterable[Mapping[str, Any]]) -> list[str]:
+    """For each truth and parameter the errors of its levels, all other parameters being the truth's."""
+    found: dict[str, list[str]] = {}
+    for effect in effects:
+        if effect["own_mm"] is not None:
+            pixels = effect["own_mm"] / MILLIMETRES_PER_PIXEL
+            words = f"{_level(effect['level'])}: {effect['own_mm']:.2f} mm ({pixels:.1f} px)"
+            found.setdefault(f"{_truth_name(effect)}: {_parameter(effect)}", []).append(words)
+    return [f"{name} {', '.join(levels)}" for name, levels in found.items()]
+
+
+def _level(level: Any) -> str:
+    return level if isinstance(level, str) else f"{level:g}"
 
 
 def _truth_name(row: Mapping[str, Any]) -> str:
