@@ -21,6 +21,7 @@ from glisson.cli.console import Answer, private_stdout, tell
 from glisson.cli.progress import StageLines
 from glisson.core.errors import BadInput, GlissonError, StageFailed
 from glisson.core.status import Status
+from glisson.framework.interruptions import interruptions_held
 
 COMMANDS = {
     "demo": "run the whole way on the phantom that ships with Glisson",
@@ -60,9 +61,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _answer(words: Sequence[str], stdout: TextIO) -> Answer:
     """The answer of a command, whatever happens in it."""
     debug = "--debug" in words or bool(os.environ.get("GLISSON_DEBUG"))
-    command = _command(next((word for word in words if not word.startswith("-")), ""))
+    command: Command | None = None
     lines = StageLines()
     try:
+        command = _command(next((word for word in words if not word.startswith("-")), ""))
         if not debug:
             warnings.simplefilter("ignore")  # they speak to programmers, of lines of code
         with redirect_stdout(stdout):
@@ -110,7 +112,8 @@ def _failure(error: BaseException, stage: str | None, command: Command | None) -
 def _command(name: str) -> Command | None:
     if name not in COMMANDS:
         return None
-    made: Command = import_module(f"glisson.cli.{name}").COMMAND
+    with interruptions_held():
+        made: Command = import_module(f"glisson.cli.{name}").COMMAND
     return made
 
 

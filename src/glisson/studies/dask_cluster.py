@@ -64,7 +64,10 @@ class DaskCluster:
             if time.monotonic() >= end:
                 return []
             time.sleep(_POLL_S)
-        return [(key, _outcome(self._futures.pop(key))) for key in ended]
+        found = [(key, _outcome(self._futures[key])) for key in ended]
+        for key in ended:
+            del self._futures[key]
+        return found
 
     def close(self) -> None:
         """Give up what is being computed; the cluster's workers stay."""

@@ -7,13 +7,12 @@ want of memory): that point has failed, the others go on.
 import multiprocessing
 import signal
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from types import FrameType
 
+from glisson.framework.interruptions import interruptions_held
 from glisson.studies.evaluation import UnfitWorker, Work, evaluate
 from glisson.studies.point import Outcome
 from glisson.studies.threads import cores
@@ -35,6 +34,7 @@ class LocalPool:
     def __init__(self, size: int | None = None) -> None:
         self._size = cores() if size is None else size
         self._workers: list[_Worker] = []
+        self._ended: list[tuple[str, Outcome]] = []
 
     @property
     def capacity(self) -> int:
@@ -48,36 +48,40 @@ class LocalPool:
 
     def submit(self, key: str, work: Work) -> None:
         """Begin a point in a process that has none."""
-        worker = next((worker for worker in self._workers if worker.key is None), None)
+        idle = (worker for worker in self._workers if worker.key is None and worker.process.is_alive())
+        worker = next(idle, None)
         if worker is None:
-            worker = _start()
-            self._workers.append(worker)
+            with interruptions_held():  # no worker is lost, and none takes a Ctrl-C for its own
+                worker = _start()
+                self._workers.append(worker)
         worker.key = key
         worker.connection.send(work)
 
     def finished(self, timeout: float) -> list[tuple[str, Outcome]]:
         """Points that have ended."""
         busy = {worker.connection: worker for worker in self._workers if worker.key is not None}
-        done: list[tuple[str, Outcome]] = []
         for connection in wait(list(busy), timeout):
-            worker = busy[connection]  # type: ignore[index]  # only connections were waited for
-            key, worker.key = worker.key, None
-            assert key is not None  # it was busy
-            try:
-                answer = worker.connection.recv()
-            except (EOFError, OSError):
-                self._workers.remove(worker)
-                done.append((key, _killed(worker)))
-                continue
-            except KeyboardInterrupt:
-                # Half an answer was read; nobody may ask for the rest.
-                self._workers.remove(worker)
-                worker.process.terminate()
-                raise
-            if isinstance(answer, UnfitWorker):
-                raise answer
-            done.append((key, answer))
-        return done
+            self._receive(busy[connection])  # type: ignore[index]  # only connections were waited for
+        ended, self._ended = self._ended, []
+        return ended
+
+    def _receive(self, worker: _Worker) -> None:
+        """Take a worker's answer; Ctrl-C meanwhile loses none that is complete."""
+        assert worker.key is not None  # it was busy
+        try:
+            answer: Outcome | UnfitWorker = worker.connection.recv()
+        except (EOFError, OSError):
+            self._workers.remove(worker)
+            answer = _killed(worker)
+        except KeyboardInterrupt:
+            # Half an answer was read; nobody may ask for the rest.
+            self._workers.remove(worker)
+            worker.process.terminate()
+            raise
+        if isinstance(answer, UnfitWorker):
+            raise answer
+        self._ended.append((worker.key, answer))
+        worker.key = None
 
     def close(self) -> None:
         """End all processes: those that wait for work at the end of their connection, the others at once."""
@@ -97,23 +101,9 @@ def _start() -> _Worker:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=_serve, args=(theirs,), daemon=True)
-    with _interruptions_held():
-        process.start()
+    process.start()
     theirs.close()
     return _Worker(process, ours)
-
-
-@contextmanager
-def _interruptions_held() -> Iterator[None]:
-    """Ctrl-C waits; a process that starts meanwhile never sees it, so that its parent alone decides."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _serve(connection: Connection) -> None:

@@ -70,6 +70,7 @@ class _Run:
         self._elsewhere: deque[str] = deque()
         self._running: dict[str, Claim] = {}
         self._begun: dict[str, float] = {}
+        self._ended: deque[tuple[str, Outcome]] = deque()  # not kept yet
         self._looked = time.monotonic()
 
     @property
@@ -94,8 +95,11 @@ class _Run:
         """Keep what has ended."""
         if not self._running:
             return
-        for key, outcome in self._executor.finished(timeout):
+        self._ended.extend(self._executor.finished(timeout))
+        while self._ended:
+            key, outcome = self._ended[0]
             self._store.keep(self._all[key], outcome)
+            self._ended.popleft()
             self.done[key] = outcome
             self._running.pop(key).release()
             del self._begun[key]
