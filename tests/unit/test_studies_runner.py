@@ -215,6 +215,12 @@ def test_what_is_not_done_in_time_is_missing_and_done_later(tasks, store, pool, 
     assert not list(store.folder.glob(".*"))
 
 
+def test_a_first_point_is_waited_for_whatever_the_time(tasks, store, pool, tmp_path):
+    points = [point(tmp_path, 1, seconds=3.0), *(point(tmp_path, n, seconds=60.0) for n in (2, 3))]
+    assert list(run_points(points, store, pool, seconds=0.5)) == [points[0].key]
+    assert sorted(computed(tmp_path)) == [1, 2]
+
+
 def test_the_forecast_is_of_costs_left(tasks, store, pool, tmp_path):
     said: list[tuple[float | None, str]] = []
     task = Task("study_tasks:square", ("study_tasks",))
@@ -324,7 +330,10 @@ def test_the_same_points_on_a_dask_cluster(tasks, store, tmp_path):
         assert sorted(computed(tmp_path)) == [1, 2, 3, 4, 5]
         assert run_points(points, store, executor)[points[1].key].values["square"] == 4
         assert sorted(computed(tmp_path)) == [1, 2, 3, 4, 5]
-        executor.close()
+        slow = point(tmp_path, 9, seconds=60.0)
+        assert list(run_points([points[1], slow], store, executor, seconds=2.0)) == [points[1].key]
+        assert not list(store.folder.glob(".*"))
+        executor.close()  # for the second time
 
 
 def test_dask_workers_with_several_threads_are_refused(tasks, store, tmp_path):

@@ -70,10 +70,11 @@ class DaskCluster:
         return found
 
     def close(self) -> None:
-        """Give up what is being computed; the cluster's workers stay."""
-        self._client.cancel(list(self._futures.values()), force=True)
+        """Give up what is being computed, and leave the cluster; its workers stay."""
+        if self._client.status == "running":
+            self._client.cancel(list(self._futures.values()), force=True)
+            self._client.close()
         self._futures.clear()
-        self._client.close()
 
 
 def _outcome(future: Any) -> Outcome:

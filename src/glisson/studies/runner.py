@@ -37,7 +37,8 @@ def run_points(
         store: where outcomes are kept.
         executor: computes the points.
         progress: told how far it is and how long it may still take.
-        seconds: after this time nothing more is computed; points that are not done are missing then.
+        seconds: after this time nothing more is begun, and what is being computed is given up, unless nothing
+            at all is done yet: then a first one is waited for. Points that are not done are missing.
 
     Raises:
         StudyInterrupted: Ctrl-C; what had ended is kept, the rest is as if it had never begun.
@@ -81,9 +82,10 @@ class _Run:
     def go(self, deadline: float | None) -> None:
         """Compute what is missing."""
         while len(self.done) < len(self._all):
-            if deadline is not None and time.monotonic() >= deadline:
+            if deadline is None or time.monotonic() < deadline:
+                self._begin()
+            elif self.done or not self._running:
                 return
-            self._begin()
             self.collect(_POLL_S)
             if not self._running and self._elsewhere:
                 time.sleep(_POLL_S)

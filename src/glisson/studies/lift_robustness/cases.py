@@ -32,6 +32,20 @@ class LiftCase:
     cohesion_kpa: float
 
 
+EASY_CASE = LiftCase(
+    member=FIRST_MEMBER,
+    hinge_x_mm=-6.0,
+    hinge_z_mm=15.0,
+    turn_deg=0.0,
+    angle_deg=5.0,
+    young_modulus_kpa=100.0,
+    poisson_ratio=0.45,
+    friction=0.1,
+    cohesion_kpa=10.0,
+)
+"""A lift that is not drawn, by a small angle."""
+
+
 def draw_case(seed: int, number: int) -> LiftCase:
     """Case `number` (from 0 on) of a seed; each case has a liver of its own."""
     random = np.random.default_rng([seed, number])
