@@ -76,7 +76,8 @@ def _whole_number(text: str | None, option: str, least: int) -> int | None:
 
 COMMAND = Command(
     "study",
-    "  glisson study sensitivity --quick\n  glisson study sensitivity --scheduler tcp://127.0.0.1:8786 --json",
+    "  glisson study sensitivity --quick\n  glisson study lift-robustness --seed 7\n"
+    "  glisson study sensitivity --scheduler tcp://127.0.0.1:8786 --json",
     _add_arguments,
     _run,
     ("rows", "cases", "converged", "seconds"),
