@@ -152,6 +152,8 @@ class _Run:
         now = time.monotonic()
         begun = sum(min(now - since, pace * self._all[key].cost) for key, since in self._begun.items())
         left = pace * self._cost(key for key in self._all if key not in self.done) - begun
+        if left <= 0.0:  # those at work take longer than expected, and nobody knows how much longer
+            return self.words
         return f"{self.words}, about {_duration(left / self._executor.capacity)} left"
 
     def _cost(self, keys: Iterable[str]) -> float:

@@ -106,13 +106,13 @@ class Sensitivity:
         known = lift_truth(PHANTOM)
         tissue = Tissue(known.young_modulus_kpa, known.poisson_ratio, known.friction, known.cohesion_kpa)
         return [
-            ("calculix", tissue, Point(CALCULIX, {"phantom": PHANTOM}, cost=100.0)),
+            ("calculix", tissue, Point(CALCULIX, {"phantom": PHANTOM}, cost=0.3)),
             *(("fine-t10", twin, self._twin(twin)) for twin in (STIFF, SOFT)),
         ]
 
     def _twin(self, tissue: Tissue) -> Point:
         inputs = {"phantom": PHANTOM, "elements": self.twin_elements, "tissue": asdict(tissue)}
-        return Point(TWIN, inputs, cost=self.twin_elements / 50.0)
+        return Point(TWIN, inputs, cost=self.twin_elements / 40.0)
 
     @cached_property
     def _lifts(self) -> dict[Choice, Point]:
