@@ -1,5 +1,6 @@
 import os
 import shutil
+import signal
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -8,6 +9,7 @@ import pytest
 from glisson.core.errors import BadInput
 from glisson.framework import settings_file
 from glisson.framework.case import SCAN, SETTINGS, Case, new_case, open_case
+from glisson.framework.interruptions import interruptions_held
 from glisson.framework.lock import LOCK, exclusive
 from glisson.framework.settings import PlaneSettings, Settings
 
@@ -88,3 +90,18 @@ def test_the_lock_of_a_killed_run_is_taken_over(case: Case) -> None:
     assert (case.folder / LOCK).exists()
     with exclusive(case.folder):
         assert (case.folder / LOCK).read_text() == str(os.getpid())
+
+
+def test_an_interruption_that_is_held_comes_at_the_end() -> None:
+    done = []
+
+    def interrupted() -> None:
+        with interruptions_held():
+            os.kill(os.getpid(), signal.SIGINT)
+            sum(range(100_000))
+            done.append("all of it")
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert done
+    assert signal.getsignal(signal.SIGINT) is not signal.SIG_DFL

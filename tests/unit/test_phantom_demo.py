@@ -6,7 +6,7 @@ import pytest
 from glisson.core import BadInput, Board, Lever, Status
 from glisson.geometry.distance import inside
 from glisson.geometry.quadratic import boundary_surface
-from glisson.phantom.demo import DEMO_SEED, TRUTH_PATH, demo_phantom
+from glisson.phantom.demo import DEMO_TRUTH, demo_phantom
 from glisson.phantom.lever_lift import LEVER_ANGLE_DEG
 from glisson.phantom.truth import read_truth, write_truth
 from glisson.phantom.truth_checks import (
@@ -25,7 +25,7 @@ def phantom():
 
 @pytest.fixture(scope="module")
 def truth():
-    return read_truth(TRUTH_PATH)
+    return DEMO_TRUTH.read()
 
 
 def _tools(phantom):
@@ -36,11 +36,11 @@ def _tools(phantom):
 
 
 def test_file_is_small():
-    assert TRUTH_PATH.stat().st_size < 2_000_000
+    assert DEMO_TRUTH.path.stat().st_size < 2_000_000
 
 
 def test_stages_are_those_of_the_scenario(phantom):
-    assert phantom.seed == DEMO_SEED
+    assert phantom.seed == DEMO_TRUTH.seed
     assert [stage.name for stage in phantom.truth.stages] == [stage.name for stage in phantom.scenario.stages]
     assert phantom.truth.status is Status.CONVERGED
     assert "CalculiX" in phantom.truth.message
@@ -118,6 +118,6 @@ def test_truth_survives_its_file(truth, tmp_path):
 
 def test_damaged_truth_is_refused(tmp_path):
     path = tmp_path / "damaged.npz"
-    path.write_bytes(TRUTH_PATH.read_bytes()[:5000])
+    path.write_bytes(DEMO_TRUTH.path.read_bytes()[:5000])
     with pytest.raises(BadInput, match="not a truth file"):
         read_truth(path)

@@ -21,6 +21,7 @@ from glisson.cli.console import Answer, private_stdout, tell
 from glisson.cli.progress import StageLines
 from glisson.core.errors import BadInput, GlissonError, StageFailed
 from glisson.core.status import Status
+from glisson.framework.interruptions import interruptions_held
 
 COMMANDS = {
     "demo": "run the whole way on the phantom that ships with Glisson",
@@ -32,6 +33,7 @@ COMMANDS = {
     "report": "write the report (runs the stages before it where they are out of date)",
     "run": "bring a case up to date, from the scan to the report",
     "benchmark": "measure Glisson beside other engines (in a checkout; make bench installs them)",
+    "study": "compute many points, each once, and tell what they say together",
     "techniques": "list the techniques of each kind, with the package that offers them",
     "doctor": "check the installation and say what is missing",
 }
@@ -60,9 +62,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _answer(words: Sequence[str], stdout: TextIO) -> Answer:
     """The answer of a command, whatever happens in it."""
     debug = "--debug" in words or bool(os.environ.get("GLISSON_DEBUG"))
-    command = _command(next((word for word in words if not word.startswith("-")), ""))
+    command: Command | None = None
     lines = StageLines()
     try:
+        command = _command(next((word for word in words if not word.startswith("-")), ""))
         if not debug:
             warnings.simplefilter("ignore")  # they speak to programmers, of lines of code
         with redirect_stdout(stdout):
@@ -86,7 +89,7 @@ def _failure(error: BaseException, stage: str | None, command: Command | None) -
     message = str(error)
     if isinstance(error, KeyboardInterrupt):
         where = "" if stage is None else f" in the stage {stage}; the case is as it was before that stage"
-        message, exit_code = f"Interrupted{where}.", _INTERRUPTED
+        message, exit_code = message or f"Interrupted{where}.", _INTERRUPTED
     elif isinstance(error, StageFailed):
         status = error.status
     elif isinstance(error, GlissonError):
@@ -110,7 +113,8 @@ def _failure(error: BaseException, stage: str | None, command: Command | None) -
 def _command(name: str) -> Command | None:
     if name not in COMMANDS:
         return None
-    made: Command = import_module(f"glisson.cli.{name}").COMMAND
+    with interruptions_held():
+        made: Command = import_module(f"glisson.cli.{name}").COMMAND
     return made
 
 

@@ -38,6 +38,7 @@ def check_installation(folder: Path) -> Iterator[Finding]:
     yield from _packages()
     yield from _techniques()
     yield _mkl()
+    yield _dask()
     yield _threads()
     yield _calculix()
     yield _disk(folder)
@@ -70,6 +71,12 @@ def _mkl() -> Finding:
     version = package_version("mkl")
     detail = version or "absent: solves take longer; install with: pip install glisson[mkl]"
     return Finding("MKL", version is not None, detail, needed=False)
+
+
+def _dask() -> Finding:
+    version = package_version("distributed")
+    detail = version or "absent: only studies on a cluster need it; install with: pip install glisson[dask]"
+    return Finding("Dask", version is not None, detail, needed=False)
 
 
 def _threads() -> Finding:

@@ -1,17 +1,13 @@
 """The phantom of the demo: the member of the family whose deformed truth ships with the package."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
-from glisson.phantom.family import DEFAULT_SPACING_MM, assemble, build_anatomy, scan_grid
+from glisson.phantom.family import DEFAULT_SPACING_MM
+from glisson.phantom.lift_truths import lift_truth
 from glisson.phantom.phantom import Phantom
-from glisson.phantom.truth import read_truth
 
-DEMO_SEED = 3
-"""The member of the family that the demo shows."""
-
-TRUTH_PATH = Path(__file__).parent / "data" / "demo_truth.npz"
-"""Its truth, made by `scripts/make_demo_truth.py`."""
+DEMO_TRUTH = lift_truth("demo")
+"""The member of the family that the demo shows, and its truth."""
 
 
 def demo_phantom(spacing_mm: Sequence[float] = DEFAULT_SPACING_MM) -> Phantom:
@@ -24,6 +20,4 @@ def demo_phantom(spacing_mm: Sequence[float] = DEFAULT_SPACING_MM) -> Phantom:
     Raises:
         BadInput: the spacing is not three lengths of 0.3 to 10 mm, or the truth's file is damaged.
     """
-    grid = scan_grid(spacing_mm)
-    truth = read_truth(TRUTH_PATH)
-    return assemble(build_anatomy(DEMO_SEED, truth.loading), DEMO_SEED, grid, truth.deformation)
+    return DEMO_TRUTH.phantom(spacing_mm)

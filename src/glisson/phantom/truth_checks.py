@@ -32,11 +32,21 @@ def smallest_jacobian(mesh: TetMesh, nodes: FloatArray) -> float:
     Taken at the integration points, relative to the straight element of `mesh`: 1 at rest, 0 where an
     element is flat.
     """
+    return float(_relative_jacobians(mesh, nodes).min())
+
+
+def inverted_elements(mesh: TetMesh, nodes: FloatArray) -> int:
+    """How many T10 elements of a mesh are flat or inside out at an integration point at `nodes` (N, 3)."""
+    return int((_relative_jacobians(mesh, nodes) <= 0.0).any(axis=0).sum())
+
+
+def _relative_jacobians(mesh: TetMesh, nodes: FloatArray) -> FloatArray:
+    """The determinants (4, m)."""
     slopes = shape_slopes(GAUSS_POINTS, quadratic=True)  # (4 points, 10, 4)
     local = slopes[:, :, 1:] - slopes[:, :, :1]
-    jacobians = np.einsum("pak,mai->mpik", local, nodes[mesh.tetrahedra])
-    relative = np.linalg.det(jacobians) / (6.0 * mesh.corner_volumes_mm3)[:, None]
-    return float(relative.min())
+    jacobians = np.einsum("pak,mai->pmik", local, nodes[mesh.tetrahedra])
+    relative: FloatArray = np.linalg.det(jacobians) / (6.0 * mesh.corner_volumes_mm3)
+    return relative
 
 
 def tumour_motion(deformation: Deformation, tumour: Tumour) -> TumourMotion:

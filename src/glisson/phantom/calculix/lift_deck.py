@@ -19,6 +19,7 @@ from glisson.core.model import Material
 from glisson.core.scenario import Lever
 from glisson.phantom.calculix.deck import FACE_OPPOSITE_CORNER, Deck, Increments, PenaltyContact
 from glisson.phantom.calculix.rigid_bodies import board_panels, lever_mesh, turned
+from glisson.phantom.heterogeneity import stiffness_levels
 
 _LEVELS = 14
 _RIGID = Material("linear-elastic", 1e4, 0.3, 0.0)
@@ -102,13 +103,10 @@ def write_lift_deck(path: Path, organ: LiftOrgan, lever: Lever, settings: LiftSe
 def _add_organ(deck: Deck, organ: LiftOrgan) -> None:
     """The organ with its materials in `_LEVELS` levels of stiffness, and what is held ("BACK")."""
     deck.add_mesh(organ.mesh, "ORGAN")
-    moduli = organ.young_moduli_kpa
-    level = np.digitize(moduli, np.geomspace(moduli.min() * 0.999, moduli.max() * 1.001, _LEVELS + 1)) - 1
-    for number in np.unique(level):
-        elements = np.flatnonzero(level == number)
-        deck.element_set(f"E{number}", elements)
-        modulus = float(moduli[elements].mean())
-        material = Material("neo-hookean", modulus, organ.poisson_ratio, organ.density_kg_m3)
+    level, means = stiffness_levels(organ.young_moduli_kpa, _LEVELS)
+    for number, modulus in enumerate(means):
+        deck.element_set(f"E{number}", np.flatnonzero(level == number))
+        material = Material("neo-hookean", float(modulus), organ.poisson_ratio, organ.density_kg_m3)
         deck.neo_hooke(f"M{number}", f"E{number}", material)
     deck.node_set("BACK", with_middles(organ.mesh, organ.held))
 

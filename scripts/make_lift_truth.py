@@ -1,4 +1,4 @@
-"""Make the deformed truth of the demo's phantom with CalculiX, and ship it with the package.
+"""Make the deformed truth of a lever lift with CalculiX, and ship it with the package.
 
 The procedural rest shape is meshed (C3D10), loaded by gravity on the board (rest → A), lifted by the lever
 with sticky contact (A → B', stage 1) and left to settle under plain Coulomb friction (B' → B, stage 2).
@@ -6,9 +6,10 @@ Contact is CalculiX's own face-to-face penalty with friction. What differs on pu
 the demo solves: engine, element, mesh, parenchyma that varies by ±15 %, a tumour three times as stiff, an
 attachment of another extent. CalculiX has no cohesion; see `glisson.phantom.calculix.lift_deck`.
 
-    .venv/bin/python scripts/make_demo_truth.py --work /tmp/truth
+    .venv/bin/python scripts/make_lift_truth.py demo --work /tmp/truth
 
-The mesh is kept in the work folder. It takes an hour or so.
+A truth is named, with its seed and its parameters, in `glisson.phantom.lift_truths`. The mesh is kept in the
+work folder. It takes an hour or so.
 """
 
 import argparse
@@ -17,21 +18,22 @@ import time
 from pathlib import Path
 
 import numpy as np
-from skimage.measure import marching_cubes
 
 from glisson.core.arrays import FloatArray, IntArray
-from glisson.core.mesh import TetMesh, TriangleSurface
+from glisson.core.mesh import TetMesh
 from glisson.core.scenario import Board, Lever
 from glisson.core.units import STANDARD_GRAVITY_MM_S2, density_from_kg_m3, radians
 from glisson.phantom.calculix.lift_deck import LiftOrgan, LiftSettings, LiftSteps, with_middles, write_lift_deck
 from glisson.phantom.calculix.results import read_frd, run_calculix
 from glisson.phantom.calculix.rigid_bodies import lever_mesh
-from glisson.phantom.demo import DEMO_SEED, TRUTH_PATH
 from glisson.phantom.family import build_anatomy, scanned_structures
+from glisson.phantom.heterogeneity import VARIATION, Contains, uneven_moduli
 from glisson.phantom.implicit import Solid
-from glisson.phantom.lever_lift import FRICTION, LEVER_ANGLE_DEG, lever_lift
+from glisson.phantom.lever_lift import LEVER_ANGLE_DEG, lever_lift
+from glisson.phantom.lift_truths import LIFT_TRUTHS, LiftTruth, lift_truth
 from glisson.phantom.scan import Anatomy
-from glisson.phantom.truth import read_truth, write_truth
+from glisson.phantom.solid_surface import solid_surface
+from glisson.phantom.truth import write_truth
 from glisson.phantom.truth_checks import (
     gap_to_lever,
     height_over_board,
@@ -42,29 +44,16 @@ from glisson.phantom.truth_checks import (
 from glisson.preoperative.attachments import DirectionAttachment, node_sets
 from glisson.preoperative.mmg import Mmg, MmgParameters
 
-YOUNG_MODULUS_KPA, POISSON_RATIO, DENSITY_KG_M3 = 7.0, 0.45, 1150.0
-VARIATION = 0.15
-TUMOUR_FACTOR = 3.0
+DENSITY_KG_M3 = 1150.0
 ATTACHMENT = DirectionAttachment(reach=0.25, left_limit=0.5)
-"""The demo's model takes 0.3 and 0.55."""
-
-
-def surface_of(solid: Solid, step_mm: float) -> TriangleSurface:
-    """The zero level of a solid by marching cubes."""
-    low, high = solid.bounds[0] - 3.0 * step_mm, solid.bounds[1] + 3.0 * step_mm
-    count = np.ceil((high - low) / step_mm).astype(int) + 1
-    axes = [low[a] + step_mm * np.arange(count[a]) for a in range(3)]
-    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    vertices, triangles, _, _ = marching_cubes(solid.distance(grid), 0.0, spacing=(step_mm,) * 3)  # type: ignore[no-untyped-call]
-    surface = TriangleSurface(vertices + low, triangles)
-    return surface if surface.volume_mm3 > 0.0 else TriangleSurface(surface.vertices, triangles[:, ::-1])
+"""The models under test take 0.3 and 0.55."""
 
 
 def rest_mesh(anatomy: Anatomy, edge_mm: float, folder: Path) -> TetMesh:
     """T10 mesh of the rest shape, kept in `folder`."""
     kept = folder / f"mesh{edge_mm:g}.npz"
     if not kept.is_file():
-        surface = surface_of(anatomy.shape.liver, 2.5)
+        surface = solid_surface(anatomy.shape.liver, 2.5)
         mesh = Mmg(MmgParameters(edge_length_mm=edge_mm, envelope_mm=edge_mm / 30.0)).mesh(surface)
         np.savez(kept, nodes=mesh.nodes.astype(np.float32), tetrahedra=mesh.tetrahedra)
         say(f"surface {surface.volume_mm3 * 1e-3:.1f} ml, mesh {mesh.volume_mm3 * 1e-3:.1f} ml")
@@ -72,19 +61,19 @@ def rest_mesh(anatomy: Anatomy, edge_mm: float, folder: Path) -> TetMesh:
         return TetMesh(stored["nodes"].astype(np.float32), stored["tetrahedra"]).as_quadratic()
 
 
-def young_moduli(mesh: TetMesh, anatomy: Anatomy) -> FloatArray:
+def young_moduli(mesh: TetMesh, anatomy: Anatomy, modulus_kpa: float) -> FloatArray:
     """Young's modulus (m,) in kPa: uneven parenchyma, and the tumours by the part of each element they fill."""
-    corners = mesh.nodes[mesh.corners]
-    waves = np.array([[0.045, 0.03, 0.02], [-0.02, 0.05, 0.06], [0.06, -0.02, -0.035]])
-    uneven = np.cos(corners.mean(axis=1) @ waves.T + [0.4, 2.1, 4.0]).mean(axis=1)
-    moduli = YOUNG_MODULUS_KPA * (1.0 + VARIATION * uneven / np.abs(uneven).max())
-    weights = np.random.default_rng(0).dirichlet(np.ones(4), size=64)
-    samples = np.einsum("sc,mcd->msd", weights, corners)
-    for tumour in anatomy.interior.tumours:
-        filled: FloatArray = (tumour.solid.distance(samples) < 0.0).mean(axis=1)
-        moduli *= 1.0 + (TUMOUR_FACTOR - 1.0) * filled
-    result: FloatArray = moduli
-    return result
+
+    def contains(solid: Solid) -> Contains:
+        return lambda points: solid.distance(points) < 0.0
+
+    return uneven_moduli(mesh, modulus_kpa, [contains(tumour.solid) for tumour in anatomy.interior.tumours])
+
+
+def settings_of(truth: LiftTruth) -> LiftSettings:
+    """Contact some 8 times as stiff per mm as the tissue, and the steps of the manoeuvre."""
+    normal = 60.0 / 7.0 * truth.young_modulus_kpa
+    return LiftSettings(LEVER_ANGLE_DEG, truth.friction, normal_kpa_mm=normal, tangent_kpa_mm=0.2 * normal)
 
 
 def weights_of(mesh: TetMesh) -> FloatArray:
@@ -116,7 +105,9 @@ def report_balance(forces: FloatArray, mesh: TetMesh, held: IntArray, bar_nodes:
     )
 
 
-def export(work: Path, organ: LiftOrgan, lever: Lever, steps: LiftSteps, settings: LiftSettings) -> None:
+def export(
+    work: Path, truth: LiftTruth, organ: LiftOrgan, lever: Lever, steps: LiftSteps, settings: LiftSettings
+) -> None:
     """Report the forces' balance and write the package's truth from CalculiX's results."""
     mesh = organ.mesh
     results = work / "lift.frd"
@@ -128,19 +119,19 @@ def export(work: Path, organ: LiftOrgan, lever: Lever, steps: LiftSteps, setting
     scanned = places[steps.scanned]
     stages = {"stage 1": places[steps.stage1] - scanned, "stage 2": places[steps.stage2] - scanned}
     note = (
-        f"CalculiX 2.20, {len(mesh.tetrahedra)} C3D10, neo-Hookean {YOUNG_MODULUS_KPA:g} kPa ± "
+        f"CalculiX 2.20, {len(mesh.tetrahedra)} C3D10, neo-Hookean {truth.young_modulus_kpa:g} kPa ± "
         f"{100 * VARIATION:g} %, own contact with friction {settings.sticky:g} in stage 1 and "
-        f"{settings.friction:g} in stage 2, made by scripts/make_demo_truth.py."
+        f"{settings.friction:g} in stage 2, made by scripts/make_lift_truth.py."
     )
-    write_truth(TRUTH_PATH, mesh, scanned, stages, note)
+    write_truth(truth.path, mesh, scanned, stages, note)
 
 
-def report(anatomy: Anatomy, board: Board, lever: Lever, angle_deg: float) -> None:
+def report(truth: LiftTruth, anatomy: Anatomy, board: Board, lever: Lever, angle_deg: float) -> None:
     """Say what the written truth is worth."""
-    truth = read_truth(TRUTH_PATH)
-    deformation, loading = truth.deformation, truth.loading
+    written = truth.read()
+    deformation, loading = written.deformation, written.loading
     rest, scanned = loading.mesh, deformation.mesh
-    say(f"{TRUTH_PATH.name}: {TRUTH_PATH.stat().st_size / 1e6:.2f} MB, {len(rest.tetrahedra)} elements")
+    say(f"{truth.file}: {truth.path.stat().st_size / 1e6:.2f} MB, {len(rest.tetrahedra)} elements")
     say(f"volume: rest {rest.volume_mm3 * 1e-3:.1f} ml, A {scanned.volume_mm3 * 1e-3:.1f} ml")
     say(f"smallest relative Jacobian: A {smallest_jacobian(rest, scanned.nodes):.3f}")
     outer = surface_nodes(rest)
@@ -166,6 +157,7 @@ def say(sentence: str) -> None:
 def main() -> int:
     """Mesh, deck, CalculiX, truth file, checks."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("name", choices=[truth.name for truth in LIFT_TRUTHS], help="which truth to make")
     parser.add_argument("--work", type=Path, required=True, help="folder for the mesh, the deck and the results")
     parser.add_argument("--edge-mm", type=float, default=18.0, help="edge length aimed at (default 18)")
     parser.add_argument("--threads", type=int, default=1, help="threads for CalculiX (default 1)")
@@ -173,14 +165,17 @@ def main() -> int:
     options = parser.parse_args()
     work: Path = options.work
     work.mkdir(parents=True, exist_ok=True)
-    anatomy = build_anatomy(DEMO_SEED)
+    truth = lift_truth(options.name)
+    anatomy = build_anatomy(truth.seed)
     board, lever = lever_lift(anatomy.proportions).tools
     assert isinstance(board, Board)
     assert isinstance(lever, Lever)
     mesh = rest_mesh(anatomy, options.edge_mm, work)
     held = node_sets(TetMesh(mesh.nodes, mesh.corners), [ATTACHMENT])["back"]
-    organ = LiftOrgan(mesh, young_moduli(mesh, anatomy), POISSON_RATIO, DENSITY_KG_M3, held)
-    settings = LiftSettings(LEVER_ANGLE_DEG, FRICTION)
+    organ = LiftOrgan(
+        mesh, young_moduli(mesh, anatomy, truth.young_modulus_kpa), truth.poisson_ratio, DENSITY_KG_M3, held
+    )
+    settings = settings_of(truth)
     deck = work / ("again.inp" if options.export_only else "lift.inp")
     steps = write_lift_deck(deck, organ, lever, settings)
     say(f"{len(mesh.nodes)} nodes, {len(mesh.tetrahedra)} C3D10, {len(held)} corners held: {deck}")
@@ -189,8 +184,8 @@ def main() -> int:
         say(f"CalculiX did not finish; see {deck.with_suffix('.log')}.")
         return 1
     say(f"CalculiX: {time.monotonic() - start:.0f} s")
-    export(work, organ, lever, steps, settings)
-    report(anatomy, board, lever, LEVER_ANGLE_DEG)
+    export(work, truth, organ, lever, steps, settings)
+    report(truth, anatomy, board, lever, LEVER_ANGLE_DEG)
     return 0
 
 

@@ -1,0 +1,84 @@
+"""`glisson study NAME`: many points, each done once, and what they tell."""
+
+import argparse
+import json
+from pathlib import Path
+
+from glisson.cli.command import Command
+from glisson.cli.console import Answer
+from glisson.cli.progress import StageLines
+from glisson.core.errors import BadInput
+from glisson.io.atomic import atomic_path
+from glisson.studies.dask_cluster import DaskCluster
+from glisson.studies.executor import Executor
+from glisson.studies.lift_robustness.study import LiftRobustness
+from glisson.studies.local_pool import LocalPool
+from glisson.studies.sensitivity.study import Sensitivity
+from glisson.studies.study import Study, run_study
+
+STUDIES = {
+    "lift-robustness": "whether the lever lift converges whatever liver, lever, tissue and contact",
+    "sensitivity": "how much mesh, law, stiffness, compressibility and contact move the tumour's place",
+}
+
+
+def _add_arguments(parser: argparse.ArgumentParser) -> None:
+    listed = "; ".join(f"{name}: {what}" for name, what in STUDIES.items())
+    parser.add_argument("study", metavar="NAME", choices=tuple(STUDIES), help=listed)
+    parser.add_argument("--quick", action="store_true", help="a minute's worth of points, after a set-up that is kept")
+    parser.add_argument("--long", action="store_true", help="with the largest meshes (sensitivity)")
+    parser.add_argument("--seed", metavar="N", default="0", help="seed of random numbers, a whole number (default 0)")
+    parser.add_argument("--out", metavar="DIR", help="folder of the study (default: ./studies/NAME)")
+    parser.add_argument("--workers", metavar="N", help="processes on this machine (default: one for each core)")
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="compute on the Dask cluster with this scheduler")
+    parser.add_argument("--element", choices=("T4", "T10"), default="T10", help="element of the models (default: T10)")
+
+
+def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
+    if arguments.quick and arguments.long:
+        raise BadInput("Choose --quick or --long, not both.")
+    folder = Path(arguments.out or f"studies/{arguments.study}")
+    study = _study(arguments)
+    executor = _executor(arguments)
+    try:
+        conclusion, seconds = run_study(study, folder, executor, lines, arguments.quick)
+    finally:
+        executor.close()
+    values = {**conclusion.values, "study": study.name, "quick": arguments.quick, "seconds": seconds}
+    with atomic_path(folder / "results.json") as temporary:
+        temporary.write_text(json.dumps(values, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    times = f"seconds   set-up {seconds['set-up']:.1f} (kept), points {seconds['points']:.1f}"
+    return Answer(values, "\n".join([conclusion.text, times, f"results   {folder}"]))
+
+
+def _study(arguments: argparse.Namespace) -> Study:
+    if arguments.study == LiftRobustness.name:
+        seed = _whole_number(arguments.seed, "--seed", 0)
+        return LiftRobustness.of(arguments.quick, seed or 0)
+    return Sensitivity.of(arguments.quick, arguments.long, arguments.element)
+
+
+def _executor(arguments: argparse.Namespace) -> Executor:
+    if arguments.scheduler is None:
+        return LocalPool(_whole_number(arguments.workers, "--workers", 1))
+    if arguments.workers is not None:
+        raise BadInput("--workers is for this machine; a Dask cluster has its own number of workers.")
+    return DaskCluster(arguments.scheduler)
+
+
+def _whole_number(text: str | None, option: str, least: int) -> int | None:
+    if text is None:
+        return None
+    if not text.isdecimal() or int(text) < least:
+        raise BadInput(f"{option} must be a whole number of at least {least}, not {text!r}.")
+    return int(text)
+
+
+COMMAND = Command(
+    "study",
+    "  glisson study sensitivity --quick\n  glisson study lift-robustness --seed 7\n"
+    "  glisson study sensitivity --scheduler tcp://127.0.0.1:8786 --json",
+    _add_arguments,
+    _run,
+    ("rows", "cases", "converged", "seconds"),
+)

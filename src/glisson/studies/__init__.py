@@ -1,0 +1,1 @@
+"""Studies: many independent points, each done once, kept and counted."""
