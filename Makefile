@@ -4,12 +4,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 DEMO_OUT ?= demo
 
-.PHONY: help demo test bench check lock clean
+.PHONY: help demo test verify bench check lock clean
 
 help:
 	@echo "make demo    run the whole way on the embedded phantom; writes $(DEMO_OUT)/results/report.html"
 	@echo "make test    run the tests"
 	@echo "make bench   measure the solver beside other engines; makes their environments first (about 2.5 GB, once)"
+	@echo "make verify  compare the tissue mechanics with closed forms and other engines; writes studies/verify"
 	@echo "make check   ruff, mypy --strict, import contracts"
 	@echo "make lock    renew requirements.lock from pyproject.toml"
 
@@ -32,6 +33,9 @@ test: $(VENV)/.ready
 bench: $(VENV)/.ready
 	PYTHON=$(PYTHON) UV=$(BIN)/uv bash benchmarks/environments.sh
 	$(BIN)/glisson benchmark solver
+
+verify: $(VENV)/.ready
+	$(BIN)/glisson verify
 
 check: $(VENV)/.ready
 	$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/mypy && $(BIN)/lint-imports

@@ -1,10 +1,10 @@
 """The lever lift on a small slab of liver that lies on a board and is held at its back."""
 
 import numpy as np
-from bodies import box_mesh, box_model
 
 from glisson.core import Board, ContactLaw, Deformation, Lever, LeverDrive, Material, Model, Scenario, Stage
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
+from glisson.verification.bodies import box_mesh, box_model
 
 DOWN = np.array([0.0, 0.0, -1.0])
 BOARD = Board("board", np.zeros(3), -DOWN)

@@ -9,51 +9,16 @@ from glisson.core.units import STANDARD_GRAVITY_MM_S2
 from glisson.phantom.calculix.deck import FACE_OPPOSITE_CORNER, Deck, Increments, PenaltyContact
 from glisson.phantom.calculix.lift_deck import LiftOrgan, LiftSettings, with_middles, write_lift_deck
 from glisson.phantom.calculix.results import calculix_program, read_frd, run_calculix
+from glisson.verification.bodies import box_mesh
+from glisson.verification.calculix_files import fields, read_displacements, read_t10
+from glisson.verification.closed_forms import uniaxial
 
 needs_calculix = pytest.mark.skipif(calculix_program() is None, reason="CalculiX (ccx) is not installed")
 
 
-def _block(size, cells):
-    """A box of T10 elements, six to a cell (Kuhn), from the origin."""
-    counts = np.array(cells) + 1
-    grid = np.stack(np.meshgrid(*[np.arange(n) for n in counts], indexing="ij"), axis=-1).reshape(-1, 3)
-    nodes = grid / np.array(cells) * np.array(size)
-    number = np.arange(len(grid)).reshape(counts)
-    tetrahedra = []
-    for order in ((0, 1, 2), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)):
-        steps = np.zeros((4, 3), dtype=int)
-        for k, axis in enumerate(order):
-            steps[k + 1 :, axis] = 1
-        i, j, k = (np.arange(n) for n in cells)
-        base = np.stack(np.meshgrid(i, j, k, indexing="ij"), axis=-1).reshape(-1, 1, 3) + steps
-        row = number[tuple(np.moveaxis(base, -1, 0))]
-        odd = (order[0] > order[1]) + (order[1] > order[2]) + (order[0] > order[2])
-        tetrahedra.append(row[:, [0, 2, 1, 3]] if odd % 2 else row)
-    return TetMesh(nodes, np.vstack(tetrahedra)).as_quadratic()
-
-
-def _uniaxial_neo_hooke(stretch, mu, kappa):
-    """(lateral stretch, nominal stress) of W = µ/2 (Ī1 − 3) + κ/2 (J − 1)², from P_lateral = 0 by bisection."""
-
-    def stresses(lateral):
-        j = stretch * lateral**2
-        mean = (stretch**2 + 2 * lateral**2) / 3
-        scale = mu * j ** (-2 / 3)
-        pressure = kappa * (j - 1) * j
-        along = (scale * (stretch**2 - mean) + pressure) / stretch
-        across = (scale * (lateral**2 - mean) + pressure) / lateral
-        return along, across
-
-    low, high = 0.5, 1.5
-    for _ in range(100):
-        middle = (low + high) / 2
-        low, high = (middle, high) if stresses(middle)[1] < 0 else (low, middle)
-    return low, stresses(low)[0]
-
-
 @needs_calculix
 def test_uniaxial_stretch_of_a_neo_hookean_block(tmp_path):
-    mesh = _block((10.0, 10.0, 20.0), (1, 1, 2))
+    mesh = box_mesh((10.0, 10.0, 20.0), (1, 1, 2), quadratic=True)
     material = Material("neo-hookean", 7.0, 0.45)
     stretch = 1.3
     deck = Deck("uniaxial")
@@ -73,7 +38,7 @@ def test_uniaxial_stretch_of_a_neo_hookean_block(tmp_path):
     moved = read_frd(tmp_path / "block.frd", "DISP")[-1]
     force = read_frd(tmp_path / "block.frd", "FORC")[-1]
     np.testing.assert_array_equal(moved.nodes, nodes)
-    lateral, stress = _uniaxial_neo_hooke(stretch, material.shear_modulus_kpa, material.bulk_modulus_kpa)
+    lateral, stress = uniaxial(stretch, material)
     assert (moved.values[:, 0] + x)[x == 10.0] == pytest.approx(10.0 * lateral, rel=1e-4)
     assert force.values[top, 2].sum() == pytest.approx(stress * 100.0, rel=1e-4)
 
@@ -81,7 +46,7 @@ def test_uniaxial_stretch_of_a_neo_hookean_block(tmp_path):
 @needs_calculix
 def test_block_on_a_board_carries_its_weight_and_slips_at_the_friction_angle(tmp_path):
     """Gravity, contact, friction and a prescribed tool in one: a block pulled over a board by a handle."""
-    mesh = _block((20.0, 10.0, 20.0), (2, 1, 2))
+    mesh = box_mesh((20.0, 10.0, 20.0), (2, 1, 2), quadratic=True)
     density, friction = 1150.0, 0.3
     deck = Deck("block on a board")
     _, elements = deck.add_mesh(mesh, "BLOCK")
@@ -124,21 +89,19 @@ def test_calculix_own_t10_beam_survives_our_writer(shared_data, tmp_path):
     """beam10p of CalculiX's test suite, its mesh written by us, its displacements compared with upstream's."""
     folder = shared_data / "open" / "calculix-tests"
     source = (folder / "beam10p.inp").read_text().splitlines()
-    numbers, places, own = _nodes_and_elements(source)
-    renumber = {n: i for i, n in enumerate(numbers)}
-    mesh = TetMesh(places, np.array([[renumber[n] for n in row[1:]] for row in own]))
+    read = read_t10(source)
     deck = Deck("beam10p")
-    deck.add_mesh(mesh, "ALL")
-    rest = _renumbered_rest(source, renumber)
+    deck.add_mesh(read.mesh, "ALL")
+    rest = _renumbered_rest(source, read.order)
     path = tmp_path / "beam.inp"
     path.write_text(deck.text + "\n".join(rest) + "\n")
     assert run_calculix(path)
-    reference = _displacements((folder / "beam10p.dat.ref").read_text().splitlines())
-    ours = _displacements(path.with_suffix(".dat").read_text().splitlines())
-    assert len(reference) == len(numbers)
-    scale = max(np.linalg.norm(value) for value in reference.values())
-    apart = [np.linalg.norm(ours[renumber[n] + 1] - value) for n, value in reference.items()]
-    assert max(apart) < 1e-5 * scale
+    numbers, expected = read_displacements((folder / "beam10p.dat.ref").read_text().splitlines())
+    ours, moved = read_displacements(path.with_suffix(".dat").read_text().splitlines())
+    assert len(numbers) == len(read.numbers)
+    rows = np.searchsorted(ours, [read.order[int(number)] + 1 for number in numbers])
+    apart = np.linalg.norm(moved[rows] - expected, axis=1).max()
+    assert apart < 1e-5 * np.linalg.norm(expected, axis=1).max()
 
 
 def test_face_numbers_are_calculix_own():
@@ -149,7 +112,7 @@ def test_face_numbers_are_calculix_own():
 
 
 def test_lift_deck_names_what_a_lift_needs(tmp_path):
-    mesh = _block((80.0, 30.0, 60.0), (4, 2, 3))
+    mesh = box_mesh((80.0, 30.0, 60.0), (4, 2, 3), quadratic=True)
     organ_mesh = TetMesh(mesh.nodes - [0.0, 30.0, 30.0], mesh.tetrahedra)
     held = np.flatnonzero(organ_mesh.nodes[: int(mesh.corners.max()) + 1, 0] == 0.0)
     organ = LiftOrgan(organ_mesh, np.linspace(6.0, 8.0, len(mesh.tetrahedra)), 0.45, 1150.0, held)
@@ -161,24 +124,6 @@ def test_lift_deck_names_what_a_lift_needs(tmp_path):
     assert text.count("*CHANGE FRICTION") == 1 + steps.stage2 - steps.stage1
     # Held are exactly the corners and middle nodes of the face x = 0.
     np.testing.assert_array_equal(with_middles(organ_mesh, held), np.flatnonzero(organ_mesh.nodes[:, 0] == 0.0))
-
-
-def _nodes_and_elements(lines):
-    numbers, places, elements, mode, row = [], [], [], "", []
-    for line in lines:
-        if line.startswith("*"):
-            mode = "" if line.startswith("**") else line.split(",")[0].upper()
-            continue
-        values = [value.strip() for value in line.split(",") if value.strip()]
-        if mode == "*NODE":
-            numbers.append(int(values[0]))
-            places.append([float(v) for v in values[1:]] + [0.0] * (4 - len(values)))
-        elif mode == "*ELEMENT":
-            row += [int(v) for v in values]
-            if len(row) == 11:
-                elements.append(row)
-                row = []
-    return np.array(numbers), np.array(places), elements
 
 
 def _renumbered_rest(lines, nodes):
@@ -195,17 +140,6 @@ def _renumbered_rest(lines, nodes):
 
 
 def _renumbered_line(line, mode, nodes):
-    values = [value.strip() for value in line.split(",") if value.strip()]
+    values = fields(line)
     count = len(values) if mode == "*NSET" else 1
     return ",".join(str(nodes[int(v)] + 1) if v.isdigit() and k < count else v for k, v in enumerate(values))
-
-
-def _displacements(lines):
-    start = next(i for i, line in enumerate(lines) if "displacements" in line)
-    found = {}
-    for line in lines[start + 2 :]:
-        if not line.strip():
-            break
-        values = line.split()
-        found[int(values[0])] = np.array([float(v) for v in values[1:4]])
-    return found

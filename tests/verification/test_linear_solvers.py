@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from bodies import body_of, box_mesh, distorted
 from scipy.sparse import triu
 from scipy.sparse.linalg import spsolve
 
@@ -11,6 +10,7 @@ from glisson.mechanics.linear_solvers import make_direct_solver, make_iterative_
 from glisson.mechanics.linear_solvers.multigrid import Multigrid
 from glisson.mechanics.linear_solvers.superlu import SuperLU
 from glisson.mechanics.numbering import numbering
+from glisson.verification.bodies import body_of, box_mesh, distorted
 
 MAKERS = {"direct": make_direct_solver, "superlu": SuperLU, "iterative": make_iterative_solver}
 

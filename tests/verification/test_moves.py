@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from bodies import box_mesh, box_model
 
 from glisson.core import ContactLaw, Material, Move, Scenario, Stage, Status
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
+from glisson.verification.bodies import box_mesh, box_model
 
 MATERIAL = Material("neo-hookean", 7.0, 0.0)
 FREE = ContactLaw()

@@ -34,6 +34,7 @@ COMMANDS = {
     "run": "bring a case up to date, from the scan to the report",
     "benchmark": "measure Glisson beside other engines (in a checkout; make bench installs them)",
     "study": "compute many points, each once, and tell what they say together",
+    "verify": "compare the tissue mechanics with closed forms, published figures and another engine",
     "techniques": "list the techniques of each kind, with the package that offers them",
     "doctor": "check the installation and say what is missing",
 }

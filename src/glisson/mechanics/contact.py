@@ -168,16 +168,17 @@ class ToolContact:
         return used, touch.rotation @ local @ touch.rotation.T
 
     def friction_by_pressure(self, touch: Touch, points_mm: FloatArray, law: ContactLaw) -> tuple[IntArray, FloatArray]:
-        """What `stiffness` leaves out: friction that follows the pressure, at points (k,) as (k, 3, 3) in mN/mm.
+        """What `stiffness` leaves out: friction that follows the pressure and turns with a curved tool's normal.
 
-        With it the linearisation is exact and not symmetric.
+        At points (k,) as (k, 3, 3) in mN/mm; with it the linearisation is exact and not symmetric.
         """
         along = np.zeros_like(points_mm)
         slipping, mobilised = self._mobilised(points_mm)
         along[slipping] = mobilised
         used = touch.points
-        slope = -law.friction * self.cushion.slope(touch.gaps) * self._surface.areas[used]
+        slope = -law.friction * self.cushion.slope(touch.gaps)
         local = slope[:, None, None] * along[used][:, :, None] * touch.normals[:, None, :]
+        local = (local + self._friction_by_turn(touch)) * self._surface.areas[used, None, None]
         return used, touch.rotation @ local @ touch.rotation.T
 
     def bond(self, points_mm: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -237,15 +238,35 @@ class ToolContact:
         slipping, slips, lengths = self._slips(points_mm)
         return slipping, (shear_share(lengths, self._stick_mm) / np.maximum(lengths, 1e-300))[:, None] * slips
 
+    def _friction_by_turn(self, touch: Touch) -> FloatArray:
+        """−∂(shear stress)/∂x (k, 3, 3) by the turn δn = H δx of the normals at the touching points.
+
+        The slip s = a − (a·n) n, with a from the anchor, changes by −(a·H δx) n − (a·n) H δx; along n the shear
+        stress only turns, as its length has no slope there.
+        """
+        away = touch.local - self.states.anchors[touch.points]
+        heights = np.einsum("pi,pi->p", away, touch.normals)
+        slips = away - heights[:, None] * touch.normals
+        lengths = np.linalg.norm(slips, axis=1)
+        secants = self.states.limits[touch.points] * _secant_share(lengths, self._stick_mm)
+        turned = np.einsum("pi,pij->pj", away, touch.curvatures)
+        result: FloatArray = -secants[:, None, None] * touch.normals[:, :, None] * turned[:, None, :]
+        result -= heights[:, None, None] * (self._friction_blocks(touch.points, slips, lengths) @ touch.curvatures)
+        return result
+
     def _friction_blocks(self, points: IntArray, slips: FloatArray, lengths: FloatArray) -> FloatArray:
         normals = self.states.normals[points]
         tangent_plane = np.eye(3) - normals[:, :, None] * normals[:, None, :]
         direction = slips / np.maximum(lengths, 1e-300)[:, None]
         along = direction[:, :, None] * direction[:, None, :]
-        # share / length tends to 2 / stick as the slip vanishes.
-        across = np.where(lengths > 1e-9, shear_share(lengths, self._stick_mm) / np.maximum(lengths, 1e-9), 0.0)
-        across = np.where(lengths > 1e-9, across, 2.0 / self._stick_mm)
+        across = _secant_share(lengths, self._stick_mm)
         slope = shear_slope(lengths, self._stick_mm)
         blocks = across[:, None, None] * (tangent_plane - along) + slope[:, None, None] * along
         result: FloatArray = self.states.limits[points][:, None, None] * blocks
         return result
+
+
+def _secant_share(lengths: FloatArray, stick_mm: float) -> FloatArray:
+    """Mobilised share over slip in 1/mm, which tends to 2 / stick as the slip vanishes."""
+    share: FloatArray = shear_share(lengths, stick_mm) / np.maximum(lengths, 1e-9)
+    return np.where(lengths > 1e-9, share, 2.0 / stick_mm)

@@ -1,0 +1,110 @@
+"""Bodies for verification: boxes of tetrahedra, and mechanical systems without a scenario."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from glisson.core.arrays import FloatArray, IntArray
+from glisson.core.mesh import TetMesh
+from glisson.core.model import Material, Model
+from glisson.core.scenario import Board
+from glisson.mechanics.body import Body
+from glisson.mechanics.contact import ToolContact
+from glisson.mechanics.contact_law import Cushion
+from glisson.mechanics.elasticity import Elasticity
+from glisson.mechanics.elements import surface_quadrature
+from glisson.mechanics.linear_solvers import make_direct_solver
+from glisson.mechanics.newton import Newton, NewtonEnd, NewtonSettings
+from glisson.mechanics.tools import RigidTool, make_tool
+from glisson.verification.check import NoSolution
+
+LAWS = ("linear-elastic", "co-rotational", "saint-venant-kirchhoff", "neo-hookean", "neo-hookean-log")
+FRAME_INDIFFERENT = LAWS[1:]
+
+# Six tetrahedra around the diagonal 0-7 of a cube whose corner c sits at (c & 1, c >> 1 & 1, c >> 2 & 1).
+_CUBE = np.array([[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]])
+
+
+def box_mesh(sizes: Sequence[float], counts: Sequence[int], quadratic: bool = False) -> TetMesh:
+    """A box from the origin, cut in `counts` cubes of six tetrahedra each."""
+    numbers = np.asarray(counts)
+    axes = [np.linspace(0.0, size, count + 1) for size, count in zip(sizes, counts, strict=True)]
+    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    cells = np.stack(np.meshgrid(*[np.arange(n) for n in counts], indexing="ij"), axis=-1).reshape(-1, 3)
+    strides = np.array([(numbers[1] + 1) * (numbers[2] + 1), numbers[2] + 1, 1])
+    offsets = np.array([[c & 1, c >> 1 & 1, c >> 2 & 1] for c in range(8)])
+    corners = (cells[:, None, :] + offsets) @ strides
+    mesh = TetMesh(nodes, corners[:, _CUBE].reshape(-1, 4))
+    return mesh.as_quadratic() if quadratic else mesh
+
+
+def mapped(mesh: TetMesh, place: Callable[[FloatArray], FloatArray]) -> TetMesh:
+    """The mesh with all its nodes (n, 3), middle ones too, taken elsewhere (n, 3)."""
+    return TetMesh(place(mesh.nodes), mesh.tetrahedra, mesh.regions)
+
+
+def distorted(mesh: TetMesh, amount: float, seed: int = 0) -> TetMesh:
+    """The mesh with its inner nodes moved at random, so that no symmetry hides a slip (T4 in, T4 out)."""
+    rng = np.random.default_rng(seed)
+    inner = np.ones(len(mesh.nodes), dtype=bool)
+    inner[np.unique(mesh.boundary()[0])] = False
+    nodes = mesh.nodes.copy()
+    nodes[inner] += rng.uniform(-amount, amount, (int(inner.sum()), 3))
+    return TetMesh(nodes, mesh.tetrahedra, mesh.regions)
+
+
+def box_model(mesh: TetMesh, material: Material, **node_sets: IntArray) -> Model:
+    """A model of one region."""
+    return Model(mesh, {0: material}, {0: "box"}, node_sets)
+
+
+def body_of(
+    mesh: TetMesh,
+    material: Material,
+    fixed: NDArray[np.bool_] | None = None,
+    boards: Sequence[Board] = (),
+    cushion: Cushion | None = None,
+    stick_mm: float = 0.005,
+    tools: Sequence[RigidTool] = (),
+) -> Body:
+    """A mechanical system of one material, on boards and other tools."""
+    surface = surface_quadrature(mesh.nodes, mesh)
+    cushion = cushion or Cushion(0.1, 2000.0)
+    everything = [*(make_tool(board) for board in boards), *tools]
+    contacts = [ToolContact(tool, surface, cushion, stick_mm) for tool in everything]
+    fixed = np.zeros(mesh.nodes.shape, dtype=bool) if fixed is None else fixed
+    return Body(Elasticity(mesh, {0: material}, mesh.nodes), surface, contacts, fixed)
+
+
+def floor(height: float = 0.0) -> Board:
+    """A board whose organ lies above it."""
+    return Board("floor", np.array([0.0, 0.0, height]), np.array([0.0, 0.0, 1.0]))
+
+
+def solve(body: Body, positions: FloatArray, tolerance: float = 1e-9, limit: int = 100) -> NewtonEnd:
+    """Newton's method from `positions` (n, 3), whatever its end."""
+    newton = Newton(body, make_direct_solver(), NewtonSettings(tolerance, limit))
+    try:
+        return newton.solve(positions)
+    finally:
+        newton.close()
+
+
+def equilibrium(body: Body, positions: FloatArray, tolerance: float = 1e-9, limit: int = 100) -> FloatArray:
+    """Node positions (n, 3) in equilibrium near `positions`.
+
+    Raises:
+        NoSolution: Newton's method did not converge.
+    """
+    end = solve(body, positions, tolerance, limit)
+    if not end.status.is_good:
+        raise NoSolution(f"no equilibrium ({end.status}, residual {end.residual:.1e}) {end.reason}".rstrip())
+    return end.positions
+
+
+def reactions(body: Body, positions: FloatArray) -> FloatArray:
+    """Forces (n, 3) in mN with which the held unknowns are held; zero elsewhere."""
+    balance = body.balance(positions, body.touches(positions))
+    forces = -(balance.internal + balance.contact + balance.external)
+    return np.where(body.fixed, forces, 0.0)
