@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -13,6 +14,7 @@ from glisson.core.scenario import ContactLaw
 from glisson.mechanics.contact import ToolContact, Touch
 from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.elements import SurfaceQuadrature, lumped_volumes
+from glisson.mechanics.parts import Part
 from glisson.mechanics.pattern import FreeSystem, Index, Stiffness, block_pattern, pair_slots
 
 _NO_SHIFT_MM = 1e-4  # shifts of nodes against each other that count as none; far above rounding
@@ -22,13 +24,15 @@ _NO_SHIFT_MM = 1e-4  # shifts of nodes against each other that count as none; fa
 class Balance:
     """Forces on the nodes (n, 3) in mN; in equilibrium their sum vanishes on the free unknowns.
 
-    `scale` in mN is the largest of the three norms, `residual` the norm of the sum divided by it. A body without
-    stress has the scale of a shift of its nodes by 0.1 µm against each other.
+    `parts` is what acts beside elements, tools and dead loads. `scale` in mN is the largest of the four norms,
+    `residual` the norm of the sum divided by it. A body without stress has the scale of a shift of its nodes by
+    0.1 µm against each other.
     """
 
     internal: FloatArray
     contact: FloatArray
     external: FloatArray
+    parts: FloatArray
     scale: float
     residual: float
     unbalanced: FloatArray
@@ -96,6 +100,7 @@ class Body:
         surface: quadrature points of its boundary.
         contacts: one for each tool.
         fixed: (n, 3) which unknowns are held.
+        parts: what else acts on the nodes.
     """
 
     def __init__(
@@ -104,10 +109,12 @@ class Body:
         surface: SurfaceQuadrature,
         contacts: Sequence[ToolContact],
         fixed: NDArray[np.bool_],
+        parts: Sequence[Part] = (),
     ) -> None:
         self.elasticity = elasticity
         self.surface = surface
         self.contacts = tuple(contacts)
+        self.parts = tuple(parts)
         self.moving = tuple(n for n, contact in enumerate(self.contacts) if contact.tool.moves)
         self.standing = tuple(n for n in range(len(self.contacts)) if n not in self.moving)
         self.external = np.zeros_like(elasticity.rest)
@@ -118,6 +125,14 @@ class Body:
         self._pattern = block_pattern(elasticity.mesh.tetrahedra, len(elasticity.rest))
         self._pairs = pair_slots(self._pattern, surface.nodes)
         self.hold(fixed)
+
+    def _cover(self, groups: Sequence[IntArray]) -> None:
+        """Let the pattern have a block for every pair of nodes of the groups (k, a)."""
+        missing = [nodes for nodes in groups if not self._pattern.covers(nodes)]
+        if missing:
+            self._pattern = self._pattern.with_groups(missing)
+            self._pairs = pair_slots(self._pattern, self.surface.nodes)
+            self.system = FreeSystem(self._pattern, self.fixed)
 
     def hold(self, fixed: NDArray[np.bool_]) -> None:
         """Change which unknowns (n, 3) are held, where they are now."""
@@ -166,20 +181,22 @@ class Body:
             points = self.surface.positions(positions)
             touching = sum(contact.energy(points) for contact in self.contacts)
         dragging = 0.0 if self.drag is None else self.drag.energy(positions)
-        return elastic + touching + dragging - float(np.vdot(self.external, positions - self.elasticity.rest))
+        acting = sum(part.energy(positions) for part in self.parts)
+        return elastic + touching + dragging + acting - float(np.vdot(self.external, positions - self.elasticity.rest))
 
     def balance(self, positions: FloatArray, touches: Sequence[Touch]) -> Balance:
         """All nodal forces and what is left of them on the free unknowns."""
         internal = -self.elasticity.forces(positions)
         contact_forces = self.contact_forces(positions, touches, range(len(self.contacts)))
-        unbalanced = internal + contact_forces + self.external
+        parts = sum((part.forces(positions) for part in self.parts), np.zeros_like(positions))
+        unbalanced = internal + contact_forces + self.external + parts
         if self.drag is not None:
             unbalanced += self.drag.forces(positions)
         unbalanced[self.fixed] = 0.0
-        largest = max(float(np.linalg.norm(part)) for part in (internal, contact_forces, self.external))
+        largest = max(float(np.linalg.norm(part)) for part in (internal, contact_forces, self.external, parts))
         scale = max(largest, self._least_scale)
         residual = float(np.linalg.norm(unbalanced)) / scale
-        return Balance(internal, contact_forces, self.external, scale, residual, unbalanced)
+        return Balance(internal, contact_forces, self.external, parts, scale, residual, unbalanced)
 
     def contact_forces(self, positions: FloatArray, touches: Sequence[Touch], tools: Iterable[int]) -> FloatArray:
         """Nodal forces (n, 3) in mN of the tools of the given numbers."""
@@ -198,7 +215,11 @@ class Body:
 
         `project` makes them positive semi-definite.
         """
+        coupled = [part.stiffness(positions, project) for part in self.parts]
+        self._cover([groups for groups, _ in coupled])
         blocks = np.zeros((self._pattern.block_count, 3, 3))
+        for groups, local in coupled:
+            self._pattern.add_groups(groups, local, blocks)
         self.elasticity.add_stiffness(positions, self._pattern, blocks, project)
         if self.drag is not None:
             self._pattern.add_diagonal(self.drag.rates, blocks)
@@ -226,6 +247,26 @@ class Body:
         """Add a share of the mean diagonal to the diagonal."""
         mean = float(self._pattern.diagonal(blocks).mean())
         self._pattern.add_diagonal(np.full(len(self.fixed), share * mean), blocks)
+
+    def accept(self, positions: FloatArray) -> None:
+        """Let friction's memory follow a converged load step."""
+        points = self.surface.positions(positions)
+        for contact in self.contacts:
+            contact.drag_anchors(points)
+        for part in self.parts:
+            part.accept(positions)
+
+    def memory(self) -> tuple[Any, ...]:
+        """What tools and parts remember, and a rejected step must put back."""
+        return tuple(contact.memory() for contact in self.contacts), tuple(part.memory() for part in self.parts)
+
+    def recall(self, memory: tuple[Any, ...]) -> None:
+        """Put back what `memory` returned."""
+        of_contacts, of_parts = memory
+        for contact, kept in zip(self.contacts, of_contacts, strict=True):
+            contact.recall(kept)
+        for part, kept in zip(self.parts, of_parts, strict=True):
+            part.recall(kept)
 
     def tangent(self, positions: FloatArray, blocks: FloatArray) -> Stiffness:
         """The matrix of stiffness blocks found at the positions, for solvers."""

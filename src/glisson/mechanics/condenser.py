@@ -30,18 +30,18 @@ class Condenser:
         self._body = body
         self._patch: Patch | None = None
         self._condensation: Condensation | None = None
-        self._fixed = body.fixed
+        self._system = body.system
 
     def patch(self, positions: FloatArray, goal: tuple[float, ...]) -> Patch | None:
         """The surface that tools may touch on their way to the angles `goal`; None where there is none."""
         if not self._body.moving:
             return None
-        known = self._patch if self._body.fixed is self._fixed else None
+        known = self._patch if self._body.system is self._system else None
         patch = find_patch(self._body, positions, goal, known)
         if patch is not None and patch is not known:
             self.close()
             self._condensation = make_condensation(len(self._body.system.free), patch.kept)
-            self._patch, self._fixed = patch, self._body.fixed
+            self._patch, self._system = patch, self._body.system
         return patch
 
     def step(

@@ -164,15 +164,14 @@ class Newton:
         patch = self._condenser.patch(positions, tools.angles)
         if patch is None:
             return None
-        memories = [contact.memory() for contact in body.contacts]
+        memory = body.memory()
         change = np.zeros_like(positions)
         answer = self._condenser.step(patch, positions, touches, balance, change, tools, self._inner_tolerance)
         if answer is not None and self._allowed_share(answer.step) == 1.0:
             moved = self._search_gain(positions, answer, balance)
             if moved is not None:
                 return moved
-        for contact, memory in zip(body.contacts, memories, strict=True):
-            contact.recall(memory)
+        body.recall(memory)
         return None
 
     def _search_gain(self, positions: FloatArray, answer: CondensedStep, balance: Balance) -> FloatArray | None:

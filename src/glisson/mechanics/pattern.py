@@ -1,5 +1,6 @@
 """The fixed sparsity of the stiffness: found once from the elements, filled many times."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,17 +21,32 @@ class BlockPattern:
     """Rows of 3 × 3 blocks, one block for every pair of nodes that share an element.
 
     `indptr` (n + 1,) and `indices` are those of a block CSR matrix with sorted columns; `slots` (m, a, a)
-    is the block number of each node pair of each element.
+    is the block number of each node pair of each of the elements (m, a).
     """
 
     indptr: Index
     indices: Index
+    tetrahedra: IntArray
     slots: Index
 
     @property
     def block_count(self) -> int:
         """Number of 3 × 3 blocks."""
         return len(self.indices)
+
+    def covers(self, groups: IntArray) -> bool:
+        """Whether there is a block for every pair of nodes of each of the groups (k, a)."""
+        return bool((pair_slots(self, groups) >= 0).all())
+
+    def with_groups(self, groups: Sequence[IntArray]) -> "BlockPattern":
+        """A pattern with also a block for every pair of nodes of the groups, arrays (k, a)."""
+        count = len(self.indptr) - 1
+        graph = csr_matrix((np.ones(self.block_count, dtype=np.bool_), self.indices, self.indptr), (count, count))
+        return _pattern_of(sum((_graph(nodes, count) for nodes in groups), graph), self.tetrahedra)
+
+    def add_groups(self, groups: IntArray, local: FloatArray, blocks: FloatArray) -> None:
+        """Add matrices (k, a, a, 3, 3) of groups of nodes (k, a), which the pattern covers, to the blocks."""
+        np.add.at(blocks, pair_slots(self, groups).ravel(), local.reshape(-1, 3, 3))
 
     def add_diagonal(self, values: FloatArray, blocks: FloatArray) -> None:
         """Add to all three unknowns of each node its value (n,)."""
@@ -53,18 +69,25 @@ class BlockPattern:
 
 def block_pattern(tetrahedra: IntArray, node_count: int) -> BlockPattern:
     """Pattern of the elements (m, a) over `node_count` nodes."""
-    size = tetrahedra.shape[1]
-    rows = np.repeat(tetrahedra, size, axis=1).ravel()
-    columns = np.tile(tetrahedra, (1, size)).ravel()
-    graph = coo_matrix((np.ones(len(rows), dtype=np.int8), (rows, columns)), (node_count, node_count)).tocsr()
+    return _pattern_of(_graph(tetrahedra, node_count), tetrahedra)
+
+
+def _graph(groups: IntArray, node_count: int) -> csr_matrix:
+    """Which nodes share one of the groups (m, a)."""
+    size = groups.shape[1]
+    rows = np.repeat(groups, size, axis=1).ravel()
+    columns = np.tile(groups, (1, size)).ravel()
+    return coo_matrix((np.ones(len(rows), dtype=np.bool_), (rows, columns)), (node_count, node_count)).tocsr()
+
+
+def _pattern_of(graph: csr_matrix, tetrahedra: IntArray) -> BlockPattern:
     graph.sort_indices()
     indptr, indices = graph.indptr.astype(np.int32), graph.indices.astype(np.int32)
-    slots = _find_slots(indptr, indices, tetrahedra, tetrahedra)
-    return BlockPattern(indptr, indices, slots)
+    return BlockPattern(indptr, indices, tetrahedra, _find_slots(indptr, indices, tetrahedra, tetrahedra))
 
 
 def pair_slots(pattern: BlockPattern, nodes: IntArray) -> Index:
-    """Block numbers (p, a, a) of all pairs within each row of `nodes` (p, a), which must share elements."""
+    """Block numbers (p, a, a) of all pairs within each row of `nodes` (p, a); −1 where there is no block."""
     result: Index = _find_slots(pattern.indptr, pattern.indices, nodes, nodes)
     return result
 
@@ -77,7 +100,8 @@ def _find_slots(indptr: Index, indices: Index, rows: IntArray, columns: IntArray
         for a in range(size):
             start, end = indptr[rows[e, a]], indptr[rows[e, a] + 1]
             for b in range(size):
-                slots[e, a, b] = start + np.searchsorted(indices[start:end], columns[e, b])
+                place = start + np.searchsorted(indices[start:end], columns[e, b])
+                slots[e, a, b] = place if place < end and indices[place] == columns[e, b] else -1
     return slots
 
 

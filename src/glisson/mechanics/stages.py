@@ -135,7 +135,7 @@ class StageRunner:
     def _load_step(self, goal: LoadState) -> NewtonEnd:
         """Equilibrium at the goal; tools, loads and anchors are put back where it is not reached."""
         body = self._body
-        memories, start = [contact.memory() for contact in body.contacts], body.loading
+        memory, start = body.memory(), body.loading
         moved = self._newton.advance(self._positions, goal)
         if moved is None:
             end = NewtonEnd(self._positions, Status.STAGNATED, 0, float("nan"))
@@ -146,8 +146,7 @@ class StageRunner:
             else:
                 end = self._equilibrium(start_at)
         if end.status is not Status.CONVERGED:
-            for contact, memory in zip(body.contacts, memories, strict=True):
-                contact.recall(memory)
+            body.recall(memory)
             body.loading = start
         return end
 
@@ -158,7 +157,7 @@ class StageRunner:
         organ comes to rest; the end is an equilibrium without it.
         """
         body = self._body
-        memories, start, before = [contact.memory() for contact in body.contacts], body.loading, self._positions
+        memory, start, before = body.memory(), body.loading, self._positions
         body.loading = goal
         balance = body.balance(before, body.touches(before))
         volumes = lumped_volumes(body.elasticity.rest, body.elasticity.mesh)
@@ -173,9 +172,7 @@ class StageRunner:
             body.drag = None
             if end.status is Status.CONVERGED:
                 self._positions = end.positions
-                points = body.surface.positions(end.positions)
-                for contact in body.contacts:
-                    contact.drag_anchors(points)
+                body.accept(end.positions)
                 if dragging < _ROUGH_TOLERANCE * balance.scale:
                     end = self._equilibrium(end.positions)
                     iterations += end.iterations
@@ -187,8 +184,7 @@ class StageRunner:
             else:
                 break
         self._positions, body.loading = before, start
-        for contact, memory in zip(body.contacts, memories, strict=True):
-            contact.recall(memory)
+        body.recall(memory)
         return replace(end, positions=before, status=Status.ITERATION_LIMIT, iterations=iterations)
 
     def _uninverted(self, moved: FloatArray) -> FloatArray | None:
@@ -245,9 +241,7 @@ class StageRunner:
     def _accept(self, stage: Stage, reach: float, end: NewtonEnd) -> None:
         body = self._body
         self._positions = end.positions
-        points = body.surface.positions(end.positions)
-        for contact in body.contacts:
-            contact.drag_anchors(points)
+        body.accept(end.positions)
         self._note(stage, reach, end)
         for contact, touch in zip(body.contacts, body.touches(end.positions, update_friction=False), strict=True):
             name, touching = contact.tool.name, bool(len(touch.points))
@@ -273,7 +267,7 @@ class StageRunner:
                 return NewtonEnd(self._positions, Status.STAGNATED, end.iterations, end.residual, reason)
             goal = [c.angle for c in body.contacts]
             goal[number] = angle + turn
-            before, memories = self._positions, [c.memory() for c in body.contacts]
+            before, memory = self._positions, body.memory()
             end = self._load_step(self._goal(angles=goal))
             if end.status is Status.CONVERGED:
                 reached = wanted - self._moment(number, end.positions)
@@ -290,8 +284,7 @@ class StageRunner:
                 # Too far: go back, so that friction sees a lever that only ever rises.
                 slope = (missing - reached) / turn
                 self._positions = before
-                for c, memory in zip(body.contacts, memories, strict=True):
-                    c.recall(memory)
+                body.recall(memory)
                 turn = max(0.99 * missing / slope, 0.1 * turn)
             elif end.status is Status.SINGULAR or turn < 1e-5:
                 return end

@@ -107,7 +107,7 @@ def _dragged(name: str, quadratic: bool) -> list[Check]:
     positions, checks = np.array(mesh.nodes), []
     for way in ways:
         positions = equilibrium(body, _carried(mesh, positions, upper, way), 1e-7)
-        body.contacts[0].drag_anchors(body.surface.positions(positions))
+        body.accept(positions)
         if way[0] in _DRAGS:
             ours, expected = -reactions(body, positions).sum(axis=0), theirs[_DRAGS.index(way[0])]
             checks += [

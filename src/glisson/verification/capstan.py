@@ -63,7 +63,7 @@ def _drawn() -> list[Check]:
         """Equilibrium, after which anchors follow; the tension at the held end in mN."""
         nonlocal positions
         positions = equilibrium(body, positions, 1e-7, limit=200)
-        body.contacts[0].drag_anchors(body.surface.positions(positions))
+        body.accept(positions)
         return float(-reactions(body, positions)[:, 2].sum())
 
     for share in np.linspace(0.0, 1.0, _LOAD_STEPS + 1)[1:]:

@@ -82,8 +82,7 @@ def _pulled(name: str, cohesion_kpa: float) -> list[Check]:
     body.renew_cohesion(positions)
     for _ in range(5):
         positions = equilibrium(body, positions + [0.05, 0.0, 0.0])
-        for contact in body.contacts:
-            contact.drag_anchors(body.surface.positions(positions))
+        body.accept(positions)
         body.renew_cohesion(positions)
     force = body.balance(positions, body.touches(positions)).contact.sum(axis=0)
     return [

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from glisson.core.arrays import FloatArray, IntArray
-from glisson.mechanics.pattern import Stiffness
+from glisson.mechanics.pattern import FreeSystem, Stiffness
 
 _SYMMETRIC_POSITIVE_DEFINITE = 2
 _ANALYSE, _FACTOR, _SOLVE, _FORWARD, _BACKWARD, _RELEASE = 11, 22, 33, 331, 333, -1
@@ -31,7 +31,7 @@ def pardiso_library() -> ctypes.CDLL | None:
 
 
 class _Handle:
-    """One matrix in PARDISO's memory; its analysis is kept as long as the pattern's size stays the same.
+    """One matrix in PARDISO's memory; its analysis is kept until it is closed.
 
     Args:
         kept: (n,) 1 for the unknowns onto which the matrix is condensed; empty for none.
@@ -49,17 +49,13 @@ class _Handle:
         if kept is not None:
             self._settings[35] = 2  # the Schur complement comes with the factor, whose halves can be applied alone
         self._permutation = np.zeros(1, dtype=np.int32) if kept is None else kept
-        self._pattern: tuple[int, int] | None = None
         self._matrix: csr_matrix | None = None
 
     def factor(self, upper: csr_matrix, out: FloatArray) -> bool:
         """Factor; `out` takes the Schur complement. False where a pivot is not positive."""
-        pattern = (upper.shape[0], upper.nnz)
-        if pattern != self._pattern:
-            self.close()
-            self._pattern, self._matrix = pattern, upper
+        analysed, self._matrix = self._matrix is not None, upper
+        if not analysed:
             self.run(_ANALYSE, np.zeros(1), out)
-        self._matrix = upper
         return self.run(_FACTOR, np.zeros(1), out) != _NOT_POSITIVE_DEFINITE
 
     def run(self, phase: int, right: FloatArray, solution: FloatArray) -> int:
@@ -83,9 +79,9 @@ class _Handle:
 
     def close(self) -> None:
         """Release PARDISO's memory."""
-        if self._pattern is not None:
+        if self._matrix is not None:
             self.run(_RELEASE, np.zeros(1), np.zeros(1))
-            self._pattern = None
+            self._matrix = None
 
     def __del__(self) -> None:
         if not sys.is_finalizing():
@@ -97,14 +93,18 @@ class Pardiso:
 
     def __init__(self) -> None:
         self._handle = _Handle()
+        self._system: FreeSystem | None = None
 
     def factor(self, matrix: Stiffness) -> bool:
-        """Factor; the analysis is repeated only when the pattern's size changed."""
+        """Factor; the analysis is repeated only for another pattern."""
+        if self._system is not matrix.system:
+            self._handle.close()
         self._system = matrix.system
         return self._handle.factor(matrix.upper, np.zeros(1))
 
     def solve(self, right: FloatArray, accuracy: float) -> FloatArray:
         """Solution (n, 3) with the last factor, as accurate as can be."""
+        assert self._system is not None  # every caller factors first
         free = self._system.restrict(right)
         solution = np.zeros_like(free)
         self._handle.run(_SOLVE, free, solution)
