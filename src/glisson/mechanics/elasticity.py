@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from copy import copy
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -60,6 +61,12 @@ class Elasticity:
             for part in parts
         ]
         self._node_ranges = [(int(mesh.tetrahedra[p].min()), int(mesh.tetrahedra[p].max())) for p in parts]
+
+    def unloaded_at(self, rest: FloatArray) -> "Elasticity":
+        """The same body with another unloaded shape (n, 3) in mm."""
+        other = copy(self)
+        other.rest, other._quadrature = rest, quadrature(rest, self.mesh)
+        return other
 
     def _chunks(self, part: IntArray, region: int, materials: Mapping[int, Material]) -> list[_Chunk]:
         """The elements of one region among those of the numbers `part`."""

@@ -5,6 +5,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from scipy.sparse import csr_array
 
 from glisson.core.arrays import FloatArray, IntArray
@@ -35,10 +36,40 @@ def quadrature(nodes: FloatArray, mesh: TetMesh) -> ElementQuadrature:
     points, weights = volume_rule(mesh.is_quadratic)
     slopes = shape_slopes(points, mesh.is_quadratic)
     derivatives = slopes[:, :, 1:] - slopes[:, :, :1]  # the first barycentric coordinate follows from the others
-    jacobians = np.einsum("mai,qak->mqik", nodes[mesh.tetrahedra], derivatives)
-    gradients = np.einsum("qak,mqki->mqai", derivatives, np.linalg.inv(jacobians))
-    volumes = np.linalg.det(jacobians) * weights / 6.0
-    return ElementQuadrature(np.ascontiguousarray(gradients), np.ascontiguousarray(volumes))
+    return ElementQuadrature(*_mapped(nodes, mesh.tetrahedra, np.ascontiguousarray(derivatives), weights / 6.0))
+
+
+@njit(cache=True, nogil=True)
+def _mapped(
+    nodes: FloatArray, tetrahedra: IntArray, derivatives: FloatArray, weights: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Derivatives (q, nodes, 3) of the shape functions and weights (q,), taken to the elements' own coordinates."""
+    points, size = derivatives.shape[0], derivatives.shape[1]
+    gradients, volumes = np.zeros((len(tetrahedra), points, size, 3)), np.zeros((len(tetrahedra), points))
+    jacobian, cofactors = np.zeros((3, 3)), np.zeros((3, 3))
+    for e in range(len(tetrahedra)):
+        for q in range(points):
+            jacobian[:] = 0.0
+            for a in range(size):
+                for i in range(3):
+                    for k in range(3):
+                        jacobian[i, k] += nodes[tetrahedra[e, a], i] * derivatives[q, a, k]
+            for i in range(3):
+                j, m = (i + 1) % 3, (i + 2) % 3
+                for k in range(3):
+                    n, p = (k + 1) % 3, (k + 2) % 3
+                    cofactors[i, k] = jacobian[j, n] * jacobian[m, p] - jacobian[j, p] * jacobian[m, n]
+            determinant = 0.0
+            for k in range(3):
+                determinant += jacobian[0, k] * cofactors[0, k]
+            volumes[e, q] = determinant * weights[q]
+            for a in range(size):
+                for i in range(3):
+                    value = 0.0
+                    for k in range(3):
+                        value += cofactors[i, k] * derivatives[q, a, k]
+                    gradients[e, q, a, i] = value / determinant
+    return gradients, volumes
 
 
 def nodal_volumes(nodes: FloatArray, mesh: TetMesh, element_factors: FloatArray) -> FloatArray:

@@ -20,7 +20,7 @@ _ROUND_OFF = 1e-13  # share of the energy that may be lost to rounding in a diff
 _LONGEST_STEP = 0.05  # of the body's diagonal, for any node in one iteration
 _COUPLED_RESIDUAL = 1e-2  # below it friction that follows the pressure is worth its price
 _COUPLED_GAIN = 0.3  # what such a step must make of the residual to be taken
-_RENEWALS = 12  # iterations of a rough solution in which points that leave lose their cohesion at once
+_RENEWALS = 12  # iterations in which points that leave lose their cohesion at once
 _PATCHED_HALVINGS = 6
 _LONGEST_PAUSE = 7  # iterations between attempts at exact contact that failed
 _INNER_TOLERANCE = 0.1  # of the outer one
@@ -82,7 +82,7 @@ class Newton:
         loose_steps = waits = pause = 0
         before = np.inf
         for iteration in range(settings.iteration_limit + 1):
-            if tolerance > settings.tolerance and iteration < _RENEWALS:
+            if iteration < _RENEWALS:
                 body.renew_cohesion(positions)
             touches = body.touches(positions)
             balance = body.balance(positions, touches)

@@ -22,7 +22,7 @@ from glisson.core.status import Status
 from glisson.mechanics.body import scatter_blocks
 from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.elements import SurfaceQuadrature, quadrature
-from glisson.mechanics.linear_solvers import LinearSolver, make_direct_solver
+from glisson.mechanics.linear_solvers import LinearSolver, make_iterative_solver
 from glisson.mechanics.pattern import FreeSystem, Stiffness, block_pattern, pair_slots
 from glisson.mechanics.unsymmetric import solve_near_symmetric
 
@@ -98,7 +98,8 @@ class _InverseProblem:
         surface: SurfaceQuadrature,
         fixed: NDArray[np.bool_],
     ) -> None:
-        self._mesh, self._materials, self._weights = mesh, materials, weights
+        self._mesh, self._weights = mesh, weights
+        self._elasticity = Elasticity(mesh, materials, mesh.nodes)
         self._beds, self._surface, self._fixed = beds, surface, fixed
         self._scanned_points = surface.positions(mesh.nodes)
         self._pattern = block_pattern(mesh.tetrahedra, len(mesh.nodes))
@@ -107,19 +108,23 @@ class _InverseProblem:
         self._share = 1.0
 
     def solve(self) -> FloatArray:
-        """X by Newton's method with backtracking on the residual, the weight brought on in steps."""
-        positions = np.array(self._mesh.nodes)
-        solver = make_direct_solver()
+        """X by Newton's method with backtracking on the residual; the weight comes on in steps where it must."""
+        solver = make_iterative_solver()
         try:
-            for share in _WEIGHT_SHARES:
-                self._share = share
-                positions = self._balanced(positions, solver)
+            found = self._balanced(np.array(self._mesh.nodes), solver)
+            if found is None:
+                found = np.array(self._mesh.nodes)
+                for share in _WEIGHT_SHARES:
+                    self._share = share
+                    found = self._balanced(found, solver)
+                    if found is None:
+                        raise self._too_soft()
         finally:
             solver.close()
-        return positions
+        return found
 
-    def _balanced(self, positions: FloatArray, solver: LinearSolver) -> FloatArray:
-        """X for the present share of the weight, started from another share's."""
+    def _balanced(self, positions: FloatArray, solver: LinearSolver) -> FloatArray | None:
+        """X for the present share of the weight, started from another share's; None where none is found."""
         force = self._unbalanced(positions)
         reference = self._share * float(np.linalg.norm(self._weights))
         for _ in range(_ITERATION_LIMIT):
@@ -127,13 +132,14 @@ class _InverseProblem:
             if size <= _TOLERANCE * reference:
                 return positions
             step = self._step(positions, force, solver)
-            if step is None:
-                break
-            found = self._search(positions, step, size)
+            found = None if step is None else self._search(positions, step, size)
             if found is None:
-                break
+                return None
             positions, force = found
-        raise StageFailed(
+        return None
+
+    def _too_soft(self) -> StageFailed:
+        return StageFailed(
             f"No unloaded shape could be found (at {100 * self._share:.0f} % of the weight): the organ is too soft to "
             "carry its weight in the scanned shape; use a higher Young's modulus, more attachments, or "
             'rest_shape = "as-scanned".',
@@ -151,7 +157,7 @@ class _InverseProblem:
         return sinking
 
     def _unbalanced(self, positions: FloatArray) -> FloatArray:
-        elasticity = Elasticity(self._mesh, self._materials, positions)
+        elasticity = self._elasticity.unloaded_at(positions)
         force = self._share * self._weights - elasticity.forces(self._mesh.nodes)
         pushes = np.zeros((len(self._surface.areas), 3))
         for bed in self._beds:
@@ -163,11 +169,15 @@ class _InverseProblem:
 
     def _step(self, positions: FloatArray, force: FloatArray, solver: LinearSolver) -> FloatArray | None:
         """Newton's step (n, 3); None where the forward stiffness is not definite."""
-        elasticity = Elasticity(self._mesh, self._materials, positions)
+        elasticity = self._elasticity.unloaded_at(positions)
         beds = self._bed_stiffness(positions)
-        stiffness, derivative = beds.copy(), -beds
-        elasticity.add_stiffness(self._mesh.nodes, self._pattern, stiffness, project=True)
-        if not solver.factor(Stiffness(self._pattern, self._system, stiffness, self._mesh.nodes)):
+        derivative = -beds
+        for project in (False, True):
+            stiffness = beds.copy()
+            elasticity.add_stiffness(self._mesh.nodes, self._pattern, stiffness, project)
+            if solver.factor(Stiffness(self._pattern, self._system, stiffness, self._mesh.nodes)):
+                break
+        else:
             return None
         elasticity.add_rest_derivative(self._mesh.nodes, self._pattern, derivative)
         return solve_near_symmetric(self._pattern.matrix(-derivative), self._system, solver, -force)
