@@ -30,6 +30,7 @@ class Condenser:
         self._body = body
         self._patch: Patch | None = None
         self._condensation: Condensation | None = None
+        self._spring: FloatArray | None = None
         self._system = body.system
 
     def patch(self, positions: FloatArray, goal: tuple[float, ...]) -> Patch | None:
@@ -53,22 +54,22 @@ class Condenser:
         change: FloatArray,
         goal: ToolState,
         tolerance: float,
+        exact: bool,
     ) -> CondensedStep | None:
         """The step under what is unbalanced and a `change` (n, 3) of loads, the tools going to their goal.
 
-        Friction's memory in the body becomes that at the goal. None where contact can't be settled.
+        Friction's memory in the body becomes that at the goal. None where contact can't be settled. Unless
+        `exact`, the organ's stiffness may be that of an earlier call, which spares a factorisation.
         """
         body, condensation = self._body, self._condensation
         assert condensation is not None  # it comes with the patch
         free = body.system.free
         others = balance.unbalanced - np.where(body.fixed, 0.0, body.contact_forces(positions, touches, body.moving))
         points = body.surface.positions(positions)[patch.points]
-        for project in (False, True):
-            blocks = body.stiffness(positions, touches, project, tools=body.standing)
-            spring = condensation.factor(body.tangent(positions, blocks).upper)
-            if spring is not None:
-                break
-        else:
+        if exact or self._spring is None:
+            self._spring = self._condensed(condensation, positions, touches)
+        spring = self._spring
+        if spring is None:
             return None
         new = condensation.reduce(change.ravel()[free]) if change.any() else np.zeros(len(patch.kept))
         load = condensation.reduce((others + change).ravel()[free])
@@ -88,8 +89,21 @@ class Condenser:
             return CondensedStep(step.reshape(positions.shape), settled.gain)
         return None
 
+    def _condensed(
+        self, condensation: Condensation, positions: FloatArray, touches: Sequence[Touch]
+    ) -> FloatArray | None:
+        """The spring (k, k) of the organ as it is, made definite only when Cholesky refuses its exact stiffness."""
+        body = self._body
+        for project in (False, True):
+            blocks = body.stiffness(positions, touches, project, tools=body.standing)
+            spring = condensation.factor(body.tangent(positions, blocks).upper)
+            if spring is not None:
+                return spring
+        return None
+
     def close(self) -> None:
         """Give the factor's memory back."""
+        self._spring = None
         if self._condensation is not None:
             self._condensation.close()
             self._condensation = None

@@ -18,6 +18,7 @@ _ARMIJO = 1e-4
 _HALVINGS = 40
 _ROUND_OFF = 1e-13  # share of the energy that may be lost to rounding in a difference of energies
 _LONGEST_STEP = 0.05  # of the body's diagonal, for any node in one iteration
+_SLOW = 0.7  # share of a residual that an iteration leaves, from which on exact contact may pay
 _COUPLED_RESIDUAL = 1e-2  # below it friction that follows the pressure is worth its price
 _COUPLED_GAIN = 0.3  # what such a step must make of the residual to be taken
 _RENEWALS = 12  # iterations in which points that leave lose their cohesion at once
@@ -51,14 +52,11 @@ class NewtonEnd:
 
 @dataclass(frozen=True, eq=False)
 class _Direction:
-    """A step (n, 3) in mm, and whether the body was held without glue and without a limit on the step.
-
-    `blocks` (b, 3, 3) is the exact stiffness, where it is the one whose factor is at hand.
-    """
+    """A step (n, 3) in mm, and whether the body was held without glue, and by its exact stiffness."""
 
     step: FloatArray
     held: bool
-    blocks: FloatArray | None = None
+    exact: bool = False
 
 
 class Newton:
@@ -80,6 +78,7 @@ class Newton:
         body, settings = self._body, self._settings
         tolerance = settings.tolerance if tolerance is None else tolerance
         loose_steps = waits = pause = 0
+        slow_before = False
         before = np.inf
         for iteration in range(settings.iteration_limit + 1):
             if iteration < _RENEWALS:
@@ -90,22 +89,28 @@ class Newton:
                 return NewtonEnd(positions, Status.CONVERGED, iteration, balance.residual)
             if iteration == settings.iteration_limit or loose_steps == _LOOSE_STEPS:
                 break
-            if waits == 0:
-                moved = self._patched(positions, touches, balance)
+            slow = balance.residual > _SLOW * before
+            if slow and waits == 0:
+                # The first time with the organ's stiffness of an earlier step, which costs no factorisation.
+                moved = self._patched(positions, touches, balance, exact=slow_before)
+                slow_before = True
                 if moved is not None:
                     positions, pause = moved, 0
                     continue
                 pause = min(2 * pause + 1, _LONGEST_PAUSE)
                 waits = pause
             else:
-                waits -= 1
-            accuracy = self._accuracy(balance.residual, before, tolerance)
-            direction, before = self._direction(positions, touches, balance.unbalanced, accuracy), balance.residual
+                slow_before = slow
+                waits -= int(slow)
+            accuracy, before = self._accuracy(balance.residual, before, tolerance), balance.residual
+            moved = self._coupled(positions, touches, balance, accuracy)
+            if moved is not None:
+                positions = moved
+                continue
+            direction = self._direction(positions, touches, balance.unbalanced, accuracy)
             if direction is None:
                 return self._ended(positions, Status.STAGNATED, iteration, balance)
-            moved = self._coupled(positions, touches, balance, direction)
-            if moved is None:
-                moved = self._search(positions, direction, balance)
+            moved = self._search(positions, direction, balance)
             if moved is None:
                 return self._ended(positions, Status.STAGNATED, iteration, balance)
             loose_steps = 0 if direction.held else loose_steps + 1
@@ -143,7 +148,9 @@ class Newton:
             direction = self._direction(positions, touches, forces, _FIRST_ACCURACY)
             step = None if direction is None else direction.step
         else:
-            answer = self._condenser.step(patch, positions, touches, balance, change, goal.tools, self._inner_tolerance)
+            answer = self._condenser.step(
+                patch, positions, touches, balance, change, goal.tools, self._inner_tolerance, exact=False
+            )
             step = None if answer is None else answer.step
         if step is None and (goal.tools.angles != body.loading.tools.angles or carried.any()):
             return None
@@ -157,7 +164,9 @@ class Newton:
         pull: FloatArray = (body.matrix(blocks) @ carried.ravel()).reshape(carried.shape)
         return pull
 
-    def _patched(self, positions: FloatArray, touches: Sequence[Touch], balance: Balance) -> FloatArray | None:
+    def _patched(
+        self, positions: FloatArray, touches: Sequence[Touch], balance: Balance, exact: bool
+    ) -> FloatArray | None:
         """Newton's step with exact contact at moving tools; None where there are none or that does not pay."""
         body = self._body
         tools = body.loading.tools
@@ -166,7 +175,7 @@ class Newton:
             return None
         memory = body.memory()
         change = np.zeros_like(positions)
-        answer = self._condenser.step(patch, positions, touches, balance, change, tools, self._inner_tolerance)
+        answer = self._condenser.step(patch, positions, touches, balance, change, tools, self._inner_tolerance, exact)
         if answer is not None and self._allowed_share(answer.step) == 1.0:
             moved = self._search_gain(positions, answer, balance)
             if moved is not None:
@@ -211,7 +220,7 @@ class Newton:
             if direction is not None:
                 break
         if direction is not None and self._allowed_share(direction) == 1.0:
-            return _Direction(direction, held=True, blocks=None if project else blocks)
+            return _Direction(direction, held=True, exact=not project)
         body.add_bonds(positions, blocks)
         glued = self._solved(positions, blocks, forces, accuracy)
         if glued is not None:
@@ -225,20 +234,22 @@ class Newton:
         return None
 
     def _coupled(
-        self, positions: FloatArray, touches: Sequence[Touch], balance: Balance, direction: _Direction
+        self, positions: FloatArray, touches: Sequence[Touch], balance: Balance, accuracy: float
     ) -> FloatArray | None:
         """Near the end, the exact step, in which friction follows the pressure; None where it does not pay.
 
         Without it the iteration converges only linearly. The matrix is not symmetric and friction has no
-        energy: the residual judges. The direction's blocks are used up.
+        energy: the residual judges.
         """
         body = self._body
         rubbing = bool(body.contacts) and body.law.friction > 0.0
-        if direction.blocks is None or balance.residual > _COUPLED_RESIDUAL or not rubbing:
+        if balance.residual > _COUPLED_RESIDUAL or not rubbing:
             return None
-        blocks = direction.blocks
+        blocks = body.stiffness(positions, touches, project=False)
+        if not self._solver.factor(body.tangent(positions, blocks.copy())):
+            return None
         body.add_friction_by_pressure(positions, touches, blocks)
-        step = solve_near_symmetric(body.matrix(blocks), body.system, self._solver, balance.unbalanced)
+        step = solve_near_symmetric(body.tangent(positions, blocks), self._solver, balance.unbalanced, accuracy)
         moved = positions + step
         if not np.isfinite(body.elasticity.energy(moved)):
             return None
@@ -277,7 +288,7 @@ class Newton:
             length *= 0.5
         else:
             return None
-        while length >= 1.0 and direction.blocks is None and self._allowed_share(2.0 * length * step) == 1.0:
+        while length >= 1.0 and not direction.exact and self._allowed_share(2.0 * length * step) == 1.0:
             further = body.energy(positions + 2.0 * length * step)
             if further >= reached:
                 break

@@ -141,7 +141,7 @@ class FreeSystem:
 
 @dataclass(frozen=True, eq=False)
 class Stiffness:
-    """A symmetric matrix of block values (b, 3, 3) at node positions (n, 3) in mm, some unknowns being held."""
+    """A matrix of block values (b, 3, 3) at node positions (n, 3) in mm, some unknowns being held."""
 
     pattern: BlockPattern
     system: FreeSystem
@@ -155,7 +155,7 @@ class Stiffness:
 
     @property
     def upper(self) -> csr_matrix:
-        """Upper triangle of the free unknowns' matrix."""
+        """Upper triangle of the free unknowns' matrix, where it is symmetric."""
         return self.system.matrix(self.blocks)
 
     def product(self, field: FloatArray) -> FloatArray:

@@ -18,7 +18,7 @@ from glisson.mechanics.contact_law import Cushion
 from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.elements import SurfaceQuadrature, surface_quadrature
 from glisson.mechanics.initial_gaps import settle_gaps
-from glisson.mechanics.linear_solvers import make_direct_solver, make_iterative_solver
+from glisson.mechanics.linear_solvers import make_iterative_solver
 from glisson.mechanics.newton import Newton, NewtonSettings
 from glisson.mechanics.numbering import numbering
 from glisson.mechanics.rest_shape import RestShape, find_rest_shape
@@ -40,7 +40,7 @@ class QuasiStaticParameters:
         "T10", "element: T10 (quadratic) or T4 (locks near incompressibility)", choices=("T4", "T10")
     )
     tolerance: float = parameter(1e-6, "residual over the largest force at which a step has converged", 1e-12, 1e-3)
-    step_deg: float = parameter(4.0, "largest turn of a lever in one load step, in degrees", 0.05, 15.0)
+    step_deg: float = parameter(8.0, "largest turn of a lever in one load step, in degrees", 0.05, 15.0)
     contact_range_mm: float = parameter(0.1, "gap in mm at which a tool begins to press", 1e-3, 2.0)
     stick_mm: float = parameter(0.2, "elastic slip in mm before friction gives way", 1e-4, 1.0)
     surface_tolerance_mm: float = parameter(
@@ -82,7 +82,7 @@ class QuasiStatic:
         except StageFailed as failure:
             return Deformation(model.mesh, (), failure.status, str(failure))
         settings = NewtonSettings(self._parameters.tolerance, self._parameters.iteration_limit)
-        newton = Newton(body, make_direct_solver() if body.moving else make_iterative_solver(), settings)
+        newton = Newton(body, make_iterative_solver(), settings)
         try:
             return StageRunner(model, scenario, body, newton, self._parameters.step_deg, progress).run()
         finally:

@@ -28,6 +28,7 @@ from glisson.mechanics.unsymmetric import solve_near_symmetric
 
 _TOLERANCE = 1e-8
 _ITERATION_LIMIT = 60
+_STEP_ACCURACY = 1e-3  # of the residual: enough for Newton steps that gain three digits each
 _WEIGHT_SHARES = (0.25, 0.5, 0.75, 1.0)
 _BED_STIFFNESS_SHARE = 10.0  # bed stiffness in Young's moduli per mm: a weight of 0.6 kPa sinks in by 0.01 mm
 _FACING = -0.5  # a surface point lies on a board when its outward normal is turned this much towards it
@@ -180,7 +181,8 @@ class _InverseProblem:
         else:
             return None
         elasticity.add_rest_derivative(self._mesh.nodes, self._pattern, derivative)
-        return solve_near_symmetric(self._pattern.matrix(-derivative), self._system, solver, -force)
+        matrix = Stiffness(self._pattern, self._system, -derivative, self._mesh.nodes)
+        return solve_near_symmetric(matrix, solver, -force, _STEP_ACCURACY)
 
     def _bed_stiffness(self, positions: FloatArray) -> FloatArray:
         """Blocks (b, 3, 3) of the beds."""
