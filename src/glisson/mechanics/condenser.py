@@ -1,6 +1,6 @@
 """One Newton step of the organ in which contact with moving tools is not linearised."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ from glisson.mechanics.contact import Touch
 from glisson.mechanics.linear_solvers import Condensation, make_condensation
 from glisson.mechanics.local_contact import LocalContact
 from glisson.mechanics.patch import Patch, find_patch
+from glisson.mechanics.spring import Spring
 
 _NEAR = 0.1  # residual below which even the spring of an organ that would buckle without its tools is trusted
 
@@ -30,7 +31,7 @@ class Condenser:
         self._body = body
         self._patch: Patch | None = None
         self._condensation: Condensation | None = None
-        self._spring: FloatArray | None = None
+        self._spring: Spring | None = None
         self._system = body.system
 
     def patch(self, positions: FloatArray, goal: tuple[float, ...]) -> Patch | None:
@@ -75,9 +76,9 @@ class Condenser:
         load = condensation.reduce((others + change).ravel()[free])
         start, goal = body.loading.tools.of(body.moving), goal.of(body.moving)
         near = balance.residual <= _NEAR and start == goal and not new.any()
-        for bounded in _springs(spring, near):
+        for candidate in spring.candidates(near):
             parts = [body.contacts[number].part(patch.points) for number in body.moving]
-            settled = LocalContact(parts, patch, points, bounded, load, new, balance.scale).settle(
+            settled = LocalContact(parts, patch, points, candidate, load, new, balance.scale).settle(
                 start, goal, tolerance
             )
             if settled is None:
@@ -89,16 +90,14 @@ class Condenser:
             return CondensedStep(step.reshape(positions.shape), settled.gain)
         return None
 
-    def _condensed(
-        self, condensation: Condensation, positions: FloatArray, touches: Sequence[Touch]
-    ) -> FloatArray | None:
-        """The spring (k, k) of the organ as it is, made definite only when Cholesky refuses its exact stiffness."""
+    def _condensed(self, condensation: Condensation, positions: FloatArray, touches: Sequence[Touch]) -> Spring | None:
+        """The spring of the organ as it is, made definite only when Cholesky refuses its exact stiffness."""
         body = self._body
         for project in (False, True):
             blocks = body.stiffness(positions, touches, project, tools=body.standing)
             spring = condensation.factor(body.tangent(positions, blocks).upper)
             if spring is not None:
-                return spring
+                return Spring(spring)
         return None
 
     def close(self) -> None:
@@ -107,24 +106,3 @@ class Condenser:
         if self._condensation is not None:
             self._condensation.close()
             self._condensation = None
-
-
-def _springs(spring: FloatArray, near: bool) -> Iterator[FloatArray]:
-    """The exact spring where it is definite or equilibrium is near, then one of an organ that can't buckle.
-
-    Against a spring that gives way contact may have no equilibrium at all. The second one has the same
-    eigenvalues (k,), the negative ones with their signs turned.
-    """
-    if near or _is_definite(spring):
-        yield spring
-    values, vectors = np.linalg.eigh(spring)
-    bounded: FloatArray = (vectors * np.abs(values)) @ vectors.T
-    yield bounded
-
-
-def _is_definite(matrix: FloatArray) -> bool:
-    try:
-        np.linalg.cholesky(matrix)
-    except np.linalg.LinAlgError:
-        return False
-    return True

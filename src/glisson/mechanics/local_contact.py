@@ -7,7 +7,7 @@ exactly, the tools moving in as many small steps as they need. To the whole orga
 is left, on which Newton's method converges in a few iterations.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +19,9 @@ from glisson.core.scenario import ContactLaw
 from glisson.mechanics.body import ToolState, scatter_blocks
 from glisson.mechanics.contact import ToolContact, Touch
 from glisson.mechanics.patch import Patch
+from glisson.mechanics.spring import Spring
+
+Solve = Callable[[FloatArray, FloatArray], FloatArray | None]
 
 _ITERATIONS = 40
 _FARTHEST_MM = 100.0  # displacements beyond it are no answer of a linearised organ
@@ -50,7 +53,7 @@ class LocalContact:
         contacts: the tools over the patch's points, with their states; they are changed.
         patch: the patch.
         points_mm: the points (p, 3) before the patch moves.
-        spring: (k, k) stiffness in mN/mm.
+        spring: the organ.
         load: (k,) force in mN on the patch before it moves, of everything but these tools.
         change: (k,) the part of `load` that is new in this step, and comes on with the tools' motion.
         scale: force in mN to which residuals relate.
@@ -61,7 +64,7 @@ class LocalContact:
         contacts: Sequence[ToolContact],
         patch: Patch,
         points_mm: FloatArray,
-        spring: FloatArray,
+        spring: Spring,
         load: FloatArray,
         change: FloatArray,
         scale: float,
@@ -160,7 +163,8 @@ class LocalContact:
         blocks = self._stiffness(displacement, touches, project=False)
         for contact, touch in zip(self._contacts, touches, strict=True):
             self._add(blocks, *contact.friction_by_pressure(touch, points, self._law))
-        step = lu_solve(lu_factor(self._with_spring(blocks)), unbalanced)
+        step = self._answer(blocks, unbalanced, _lu_solve)
+        assert step is not None  # a singular matrix gives a useless step
         for length in _COUPLED_LENGTHS:
             moved: FloatArray = displacement + length * step
             found = self._unbalanced(moved, self._touches(moved))
@@ -189,10 +193,11 @@ class LocalContact:
     ) -> FloatArray | None:
         """Displacement (k,) under a force (k,); the stiffness is made definite only when Cholesky refuses it."""
         for projected in (True,) if project else (False, True):
-            matrix = self._with_spring(self._stiffness(displacement, touches, projected))
-            step = _cholesky_solve(matrix, force)
+            blocks = self._stiffness(displacement, touches, projected)
+            step = self._answer(blocks, force, _cholesky_solve)
             if step is not None:
                 return step
+        matrix = self._spring.stiffness + self._on_unknowns(blocks)
         diagonal = float(np.diag(matrix).mean())
         for share in _SHIFTS:
             step = _cholesky_solve(matrix + share * diagonal * np.eye(len(matrix)), force)
@@ -231,13 +236,13 @@ class LocalContact:
         pushes = np.zeros_like(points)
         for contact, touch in zip(self._contacts, touches, strict=True):
             pushes += contact.forces(touch, points)
-        unbalanced: FloatArray = self._load - self._spring @ displacement + self._scatter(pushes)
+        unbalanced: FloatArray = self._load - self._spring.stiffness @ displacement + self._scatter(pushes)
         return unbalanced
 
     def _energy(self, displacement: FloatArray) -> float:
         points = self._moved(displacement)
         touching = sum(contact.energy(points) for contact in self._contacts)
-        return touching + float(displacement @ (0.5 * self._spring @ displacement - self._load))
+        return touching + float(displacement @ (0.5 * self._spring.stiffness @ displacement - self._load))
 
     def _stiffness(self, displacement: FloatArray, touches: Sequence[Touch], project: bool) -> FloatArray:
         """Blocks (m², 3, 3) of the contacts alone."""
@@ -249,13 +254,36 @@ class LocalContact:
     def _add(self, blocks: FloatArray, used: IntArray, local: FloatArray) -> None:
         scatter_blocks(used, local, self._patch.surface.shapes, self._pairs, blocks)
 
-    def _with_spring(self, blocks: FloatArray) -> FloatArray:
-        """The dense matrix (k, k) of the spring and of blocks (m², 3, 3)."""
+    def _answer(self, blocks: FloatArray, force: FloatArray, solve: Solve) -> FloatArray | None:
+        """Displacement (k,) under a force (k,) of the spring with blocks (m², 3, 3); None where `solve` gives none.
+
+        Where the spring has an inverse it is condensed further, onto the few nodes with blocks.
+        """
+        stiffness, compliance = self._on_unknowns(blocks), self._spring.compliance
+        if compliance is None:
+            return solve(self._spring.stiffness + stiffness, force)
+        used = np.flatnonzero(stiffness.any(axis=0))
+        free = compliance @ force
+        if not len(used):
+            return free
+        touching = stiffness[np.ix_(used, used)]
+        condensed = np.linalg.inv(compliance[np.ix_(used, used)])
+        moved = solve(0.5 * (condensed + condensed.T) + touching, condensed @ free[used])
+        if moved is None:
+            return None
+        answer: FloatArray = free - compliance[:, used] @ (touching @ moved)
+        return answer
+
+    def _on_unknowns(self, blocks: FloatArray) -> FloatArray:
+        """The dense matrix (k, k) of blocks (m², 3, 3)."""
         count, free = len(self._patch.nodes), self._patch.unknowns
         matrix = blocks.reshape(count, count, 3, 3).transpose(0, 2, 1, 3).reshape(3 * count, 3 * count)
-        whole = len(free) == len(matrix)
-        stiffness: FloatArray = self._spring + (matrix if whole else matrix[np.ix_(free, free)])
-        return stiffness
+        return matrix if len(free) == len(matrix) else matrix[np.ix_(free, free)]
+
+
+def _lu_solve(matrix: FloatArray, force: FloatArray) -> FloatArray:
+    solution: FloatArray = lu_solve(lu_factor(matrix, check_finite=False), force, check_finite=False)
+    return solution
 
 
 def _cholesky_solve(matrix: FloatArray, force: FloatArray) -> FloatArray | None:

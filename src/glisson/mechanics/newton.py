@@ -18,7 +18,8 @@ _ARMIJO = 1e-4
 _HALVINGS = 40
 _ROUND_OFF = 1e-13  # share of the energy that may be lost to rounding in a difference of energies
 _LONGEST_STEP = 0.05  # of the body's diagonal, for any node in one iteration
-_SLOW = 0.7  # share of a residual that an iteration leaves, from which on exact contact may pay
+_SLOW = 0.9  # share of a residual that an iteration leaves, from which on exact contact may pay
+_STALE_RESCUES = 2  # such steps in a row that may use the stiffness of an earlier one
 _COUPLED_RESIDUAL = 1e-2  # below it friction that follows the pressure is worth its price
 _COUPLED_GAIN = 0.3  # what such a step must make of the residual to be taken
 _RENEWALS = 12  # iterations in which points that leave lose their cohesion at once
@@ -77,8 +78,7 @@ class Newton:
         """
         body, settings = self._body, self._settings
         tolerance = settings.tolerance if tolerance is None else tolerance
-        loose_steps = waits = pause = 0
-        slow_before = False
+        loose_steps = waits = pause = rescues = 0
         before = np.inf
         for iteration in range(settings.iteration_limit + 1):
             if iteration < _RENEWALS:
@@ -91,16 +91,16 @@ class Newton:
                 break
             slow = balance.residual > _SLOW * before
             if slow and waits == 0:
-                # The first time with the organ's stiffness of an earlier step, which costs no factorisation.
-                moved = self._patched(positions, touches, balance, exact=slow_before)
-                slow_before = True
+                # At first with the organ's stiffness of an earlier step, which costs no factorisation.
+                moved = self._patched(positions, touches, balance, exact=rescues >= _STALE_RESCUES)
+                rescues += 1
                 if moved is not None:
                     positions, pause = moved, 0
                     continue
                 pause = min(2 * pause + 1, _LONGEST_PAUSE)
                 waits = pause
             else:
-                slow_before = slow
+                rescues = rescues if slow else 0
                 waits -= int(slow)
             accuracy, before = self._accuracy(balance.residual, before, tolerance), balance.residual
             moved = self._coupled(positions, touches, balance, accuracy)
