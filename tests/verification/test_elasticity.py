@@ -4,7 +4,7 @@ from scipy.spatial.transform import Rotation
 
 from glisson.core import Material
 from glisson.mechanics.materials.law import find_law
-from glisson.verification.bodies import FRAME_INDIFFERENT, LAWS
+from glisson.verification.bodies import FRAME_INDIFFERENT, LAWS, material_of
 
 
 def _gradients(count: int, size: float) -> np.ndarray:
@@ -13,7 +13,7 @@ def _gradients(count: int, size: float) -> np.ndarray:
 
 @pytest.mark.parametrize("law_name", LAWS)
 def test_laws_are_hookean_for_small_strain(law_name: str) -> None:
-    material = Material(law_name, 7.0, 0.45)
+    material = material_of(law_name)
     strain = np.array([[1.0, 0.2, -0.3], [0.2, -0.4, 0.5], [-0.3, 0.5, 0.7]])
     hooke = material.lame_lambda_kpa * np.trace(strain) * np.eye(3) + 2 * material.shear_modulus_kpa * strain
     law = find_law(law_name)
@@ -24,7 +24,7 @@ def test_laws_are_hookean_for_small_strain(law_name: str) -> None:
 
 @pytest.mark.parametrize("law_name", FRAME_INDIFFERENT)
 def test_hyperelastic_laws_do_not_feel_rotation(law_name: str) -> None:
-    law, material = find_law(law_name), Material(law_name, 7.0, 0.45)
+    law, material = find_law(law_name), material_of(law_name)
     gradients = _gradients(10, 0.2)
     rotation, _ = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))
     rotation *= np.sign(np.linalg.det(rotation))
@@ -53,5 +53,5 @@ def test_uniaxial_stress_in_a_turned_frame(law_name: str, stress) -> None:
 
 @pytest.mark.parametrize("law_name", FRAME_INDIFFERENT)
 def test_inverted_elements_have_infinite_energy(law_name: str) -> None:
-    law, material = find_law(law_name), Material(law_name, 7.0, 0.45)
+    law, material = find_law(law_name), material_of(law_name)
     assert np.isinf(law.energy(np.diag([1.0, 1.0, -0.1])[None], material)).all()

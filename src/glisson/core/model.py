@@ -14,14 +14,20 @@ from glisson.core.structures import Structures
 
 @dataclass(frozen=True)
 class Material:
-    """Elastic material of one region. `law` names a material technique (for example "neo-hookean")."""
+    """Elastic material of one region. `law` names a material technique (for example "neo-hookean").
+
+    `constants` are what a law needs beside Young's modulus and Poisson's ratio, which hold for small strain.
+    """
 
     law: str
     young_modulus_kpa: float
     poisson_ratio: float
     density_kg_m3: float = 1150.0
+    constants: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
+        if not np.isfinite(self.constants).all():
+            raise BadInput(f"Constants of a material law must be finite numbers, not {list(self.constants)}.")
         if not self.young_modulus_kpa > 0.0 or not np.isfinite(self.young_modulus_kpa):
             raise BadInput(f"Young's modulus must be positive, not {self.young_modulus_kpa} kPa.")
         if not -1.0 < self.poisson_ratio < 0.5:

@@ -60,6 +60,7 @@ def _material_table(material: Material) -> dict[str, Any]:
         "young_modulus_kpa": material.young_modulus_kpa,
         "poisson_ratio": material.poisson_ratio,
         "density_kg_m3": material.density_kg_m3,
+        "constants": list(material.constants),
     }
 
 
@@ -70,6 +71,7 @@ def _material(record: Record) -> Material:
             record.number("young_modulus_kpa"),
             record.number("poisson_ratio"),
             record.number("density_kg_m3"),
+            tuple(record.floats("constants", -1).tolist()) if record.has("constants") else (),
         )
 
 

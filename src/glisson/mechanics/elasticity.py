@@ -73,6 +73,7 @@ class Elasticity:
         elements = part[self.mesh.region_numbers[part] == region]
         material = materials[int(region)]
         law = find_law(material.law)
+        law.check(material)
         return [_Chunk(piece, law, material) for piece in np.array_split(elements, -(-len(elements) // _CHUNK))]
 
     def energy(self, positions: FloatArray) -> float:

@@ -108,11 +108,13 @@ class Newton:
                 positions = moved
                 continue
             direction = self._direction(positions, touches, balance.unbalanced, accuracy)
-            if direction is None:
-                return self._ended(positions, Status.STAGNATED, iteration, balance)
-            moved = self._search(positions, direction, balance)
-            if moved is None:
-                return self._ended(positions, Status.STAGNATED, iteration, balance)
+            moved = None if direction is None else self._search(positions, direction, balance)
+            if direction is None or moved is None:
+                moved = self._patched(positions, touches, balance, exact=True)
+                if moved is None:
+                    return self._ended(positions, Status.STAGNATED, iteration, balance)
+                positions = moved
+                continue
             loose_steps = 0 if direction.held else loose_steps + 1
             if not direction.held:
                 body.add_cohesion(touches)  # perhaps nothing else holds it

@@ -19,8 +19,23 @@ from glisson.mechanics.newton import Newton, NewtonEnd, NewtonSettings
 from glisson.mechanics.tools import RigidTool, make_tool
 from glisson.verification.check import NoSolution
 
-LAWS = ("linear-elastic", "co-rotational", "saint-venant-kirchhoff", "neo-hookean", "neo-hookean-log")
+LAWS = (
+    "linear-elastic",
+    "co-rotational",
+    "saint-venant-kirchhoff",
+    "neo-hookean",
+    "neo-hookean-log",
+    "mooney-rivlin",
+    "ogden",
+)
 FRAME_INDIFFERENT = LAWS[1:]
+_CONSTANTS = {"mooney-rivlin": (0.3,), "ogden": (1.6, 0.8, -2.5, 0.2)}
+
+
+def material_of(law: str, young_modulus_kpa: float = 7.0, poisson_ratio: float = 0.45) -> Material:
+    """A material of that law, with constants where it needs some."""
+    return Material(law, young_modulus_kpa, poisson_ratio, constants=_CONSTANTS.get(law, ()))
+
 
 # Six tetrahedra around the diagonal 0-7 of a cube whose corner c sits at (c & 1, c >> 1 & 1, c >> 2 & 1).
 _CUBE = np.array([[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]])

@@ -4,8 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from glisson.core.model import Material
-from glisson.verification.bodies import LAWS, body_of, box_mesh, distorted, equilibrium
+from glisson.verification.bodies import LAWS, body_of, box_mesh, distorted, equilibrium, material_of
 from glisson.verification.check import Case, Check, vanishing
 
 _SIZES = (30.0, 20.0, 10.0)
@@ -17,7 +16,7 @@ def _patch(name: str, quadratic: bool, law: str) -> list[Check]:
     mesh = coarse.as_quadratic() if quadratic else coarse
     outside = (np.abs(mesh.nodes / _SIZES - 0.5) > 0.5 - 1e-9).any(axis=1, keepdims=True)
     affine = mesh.nodes @ (np.eye(3) + _GRADIENT).T
-    body = body_of(mesh, Material(law, 7.0, 0.45), np.repeat(outside, 3, axis=1))
+    body = body_of(mesh, material_of(law), np.repeat(outside, 3, axis=1))
     start = np.where(outside, affine, mesh.nodes + 0.9 * (affine - mesh.nodes))
     end = equilibrium(body, start, tolerance=1e-13)
     error = np.abs(end - affine).max() / np.abs(affine - mesh.nodes).max()

@@ -5,10 +5,9 @@ from functools import partial
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from glisson.core.model import Material
 from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.materials.law import find_law
-from glisson.verification.bodies import FRAME_INDIFFERENT, box_mesh, distorted
+from glisson.verification.bodies import FRAME_INDIFFERENT, box_mesh, distorted, material_of
 from glisson.verification.check import Case, Check, vanishing
 
 _TURNS = Rotation.from_rotvec(
@@ -17,7 +16,7 @@ _TURNS = Rotation.from_rotvec(
 
 
 def _rigid(name: str, law_name: str) -> list[Check]:
-    material = Material(law_name, 7.0, 0.45)
+    material = material_of(law_name)
     stress = np.abs(find_law(law_name).stress(_TURNS, material)).max()
     mesh = distorted(box_mesh((30.0, 20.0, 10.0), (3, 2, 2)), 0.5).as_quadratic()
     body = Elasticity(mesh, {0: material}, mesh.nodes)

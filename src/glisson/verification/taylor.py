@@ -18,13 +18,13 @@ from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.materials.law import find_law
 from glisson.mechanics.pattern import block_pattern
 from glisson.mechanics.tools import LeverTool, RigidTool, make_tool
-from glisson.verification.bodies import FRAME_INDIFFERENT, LAWS, body_of, box_mesh, distorted, floor
+from glisson.verification.bodies import FRAME_INDIFFERENT, LAWS, body_of, box_mesh, distorted, floor, material_of
 from glisson.verification.check import Case, Check, NoSolution, taylor_check, vanishing
 
 
 def _law(name: str, law_name: str) -> list[Check]:
     """Stress and tangent at twenty random deformation gradients."""
-    law, material = find_law(law_name), Material(law_name, 7.0, 0.45)
+    law, material = find_law(law_name), material_of(law_name)
     gradients = np.eye(3) + np.random.default_rng(3).uniform(-0.2, 0.2, (20, 3, 3))
     direction = np.random.default_rng(4).uniform(-1, 1, (20, 3, 3))
     energy, stress = law.energy(gradients, material), law.stress(gradients, material)
@@ -57,7 +57,7 @@ def _bent() -> tuple[TetMesh, FloatArray, FloatArray]:
 def _body(name: str, law_name: str) -> list[Check]:
     """Forces and stiffness of a whole body, by its deformed and by its unloaded positions."""
     mesh, positions, direction = _bent()
-    materials = {0: Material(law_name, 7.0, 0.45)}
+    materials = {0: material_of(law_name)}
     body = body_of(mesh, materials[0])
     elasticity = body.elasticity
     energy, forces = elasticity.energy(positions), elasticity.forces(positions)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
 from glisson.core.arrays import FloatArray
+from glisson.core.errors import BadInput
 from glisson.core.model import Material
 from glisson.core.registry import make_technique
 
@@ -19,6 +20,13 @@ class Law(Protocol):
     A law vanishes at F = 1, is frame-indifferent (the small-strain one excepted) and reduces to linear
     elasticity with the material's Young's modulus and Poisson's ratio for small strain.
     """
+
+    def check(self, material: Material) -> None:
+        """Whether the material has the constants that the law needs.
+
+        Raises:
+            BadInput: it has not.
+        """
 
     def energy(self, gradients: FloatArray, material: Material) -> FloatArray:
         """Strain energy density W (n,); infinite where the law has no meaning (J ≤ 0)."""
@@ -42,6 +50,15 @@ class PlainLaw:
     def missing_dependencies(cls) -> tuple[str, ...]:
         """Nothing is needed."""
         return ()
+
+    def check(self, material: Material) -> None:
+        """Most laws need no constants beside E and ν.
+
+        Raises:
+            BadInput: the material has some.
+        """
+        if material.constants:
+            raise BadInput(f"Material law {material.law} takes no constants, but there are {list(material.constants)}.")
 
 
 def find_law(name: str) -> Law:
