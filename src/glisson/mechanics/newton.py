@@ -151,7 +151,7 @@ class Newton:
             step = None if direction is None else direction.step
         else:
             answer = self._condenser.step(
-                patch, positions, touches, balance, change, goal.tools, self._inner_tolerance, exact=False
+                patch, positions, touches, balance, change, goal.tools, self._inner_tolerance, exact=True
             )
             step = None if answer is None else answer.step
         if step is None and (goal.tools.angles != body.loading.tools.angles or carried.any()):
