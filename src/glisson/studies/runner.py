@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import Iterable, Sequence
 
 from glisson.core.protocols import Progress, silent
+from glisson.framework.interruptions import interruptions_held
 from glisson.framework.lock import Claim
 from glisson.studies.evaluation import work_of
 from glisson.studies.executor import Executor
@@ -103,7 +104,8 @@ class _Run:
             self._store.keep(self._all[key], outcome)
             self._ended.popleft()
             self.done[key] = outcome
-            self._running.pop(key).release()
+            with interruptions_held():
+                self._running.pop(key).release()
             del self._begun[key]
 
     def give_up(self) -> None:
@@ -118,15 +120,16 @@ class _Run:
         while self._waiting and len(self._running) < self._executor.capacity:
             key = self._waiting.popleft()
             point = self._all[key]
-            claim = self._store.claim(point)
-            if claim is None:
-                self._elsewhere.append(key)
-                continue
-            # Another process may have ended it between the last look and the claim.
-            if self._take_stored(key, point):
-                claim.release()
-                continue
-            self._running[key], self._begun[key] = claim, time.monotonic()
+            with interruptions_held():  # else a claim that nobody knows of would be left
+                claim = self._store.claim(point)
+                if claim is None:
+                    self._elsewhere.append(key)
+                    continue
+                # Another process may have ended it between the last look and the claim.
+                if self._take_stored(key, point):
+                    claim.release()
+                    continue
+                self._running[key], self._begun[key] = claim, time.monotonic()
             self._executor.submit(key, work_of(point, self._store.folder, self._executor.threads))
 
     def _look_elsewhere(self) -> None:
