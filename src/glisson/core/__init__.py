@@ -12,7 +12,7 @@ from glisson.core.guidance import (
 )
 from glisson.core.image import Grid, LabelMap, Volume
 from glisson.core.mesh import TetMesh, TriangleSurface
-from glisson.core.model import Material, Model
+from glisson.core.model import Capsule, Material, Model
 from glisson.core.observations import Observation, Observations
 from glisson.core.scenario import Board, ContactLaw, Lever, LeverDrive, Move, Scenario, Stage
 from glisson.core.status import Status
@@ -22,6 +22,7 @@ from glisson.core.transform import RigidTransform
 __all__ = [
     "BadInput",
     "Board",
+    "Capsule",
     "ContactLaw",
     "ContactReport",
     "CrossedVessel",

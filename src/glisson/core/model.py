@@ -54,12 +54,28 @@ class Material:
         return self.bulk_modulus_kpa - 2.0 / 3.0 * self.shear_modulus_kpa
 
 
+@dataclass(frozen=True)
+class Capsule:
+    """The organ's skin: an incompressible elastic membrane, free of stress in A."""
+
+    young_modulus_kpa: float
+    thickness_mm: float
+
+    def __post_init__(self) -> None:
+        if not (0.0 < self.young_modulus_kpa < np.inf and 0.0 < self.thickness_mm < 10.0):
+            raise BadInput(
+                "A capsule needs a positive Young's modulus and a thickness of up to 10 mm, not "
+                f"{self.young_modulus_kpa} kPa and {self.thickness_mm} mm."
+            )
+
+
 @dataclass(frozen=True, eq=False)
 class Model:
     """What the scan says of the organ, in its scanned shape A.
 
     `materials` maps region numbers of the mesh to materials, `region_names` to names for people,
-    `node_sets` names to node numbers (attachments such as "back").
+    `node_sets` names to node numbers (attachments such as "back"). `ligaments` maps node sets to the stiffness in
+    kPa/mm with which they are drawn back to where they are in A; node sets that are held fast belong to the stages.
     """
 
     mesh: TetMesh
@@ -67,6 +83,8 @@ class Model:
     region_names: Mapping[int, str]
     node_sets: Mapping[str, IntArray]
     structures: Structures = field(default_factory=Structures)
+    capsule: Capsule | None = None
+    ligaments: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         present = {int(n) for n in np.unique(self.mesh.region_numbers)}
@@ -80,6 +98,11 @@ class Model:
         object.__setattr__(self, "materials", MappingProxyType(dict(self.materials)))
         object.__setattr__(self, "region_names", MappingProxyType(dict(self.region_names)))
         object.__setattr__(self, "node_sets", MappingProxyType(sets))
+        for name, stiffness in self.ligaments.items():
+            self.node_set(name)
+            if not 0.0 < stiffness < np.inf:
+                raise BadInput(f"Ligament {name!r} needs a positive stiffness, not {stiffness} kPa/mm.")
+        object.__setattr__(self, "ligaments", MappingProxyType(dict(self.ligaments)))
 
     def node_set(self, name: str) -> IntArray:
         """Node numbers of a named set.

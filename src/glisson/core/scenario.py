@@ -123,10 +123,11 @@ class Move:
 
 @dataclass(frozen=True)
 class Stage:
-    """One stage: its own gravity, contact law, fixed node sets, tool motion and carried node sets.
+    """One stage: its own gravity, contact law, fixed node sets, tool motion, carried node sets and gas pressure.
 
     `drives` names the levers that move; the others hold the angle that they had. What `moves` carries is let go
-    at the stage's end, unless the next stage names it among `fixed` or `moves`.
+    at the stage's end, unless the next stage names it among `fixed` or `moves`. The gas of a pneumoperitoneum presses
+    on the whole surface (12 mmHg are 1.6 kPa).
     """
 
     name: str
@@ -135,6 +136,14 @@ class Stage:
     gravity: bool = True
     fixed: tuple[str, ...] = ("back",)
     moves: tuple[Move, ...] = ()
+    gas_pressure_kpa: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.gas_pressure_kpa <= 20.0:
+            raise BadInput(
+                f"Stage {self.name!r}: the gas pressure must lie in 0 to 20 kPa, not {self.gas_pressure_kpa} kPa "
+                "(12 mmHg are 1.6 kPa)."
+            )
 
 
 @dataclass(frozen=True, eq=False)

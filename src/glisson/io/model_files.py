@@ -1,9 +1,10 @@
 """A model on disk: `model.vtu` (mesh and regions) and `model.json` (materials, node sets, structures)."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from glisson.core import BadInput, Curve, Material, Model, Structures, TriangleSurface, Tumour, VesselTree
+from glisson.core import BadInput, Capsule, Curve, Material, Model, Structures, TriangleSurface, Tumour, VesselTree
 from glisson.io.mesh_pairs import read_pair, write_pair
 from glisson.io.records import Record
 
@@ -20,13 +21,16 @@ def write_model(folder: str | Path, model: Model) -> None:
         BadInput: the place cannot be written.
         WriteFailed: the disk is full.
     """
-    values = {
+    values: dict[str, Any] = {
         "schema": SCHEMA,
         "materials": {number: _material_table(material) for number, material in model.materials.items()},
         "region_names": dict(model.region_names),
         "node_sets": dict(model.node_sets),
         "structures": _structures_table(model.structures),
+        "ligaments": dict(model.ligaments),
     }
+    if model.capsule is not None:
+        values["capsule"] = asdict(model.capsule)
     write_pair(Path(folder), _NAME, model.mesh, {}, values)
 
 
@@ -45,6 +49,8 @@ def read_model(folder: str | Path) -> Model:
             region_names={_region(key): names.text(key) for key in names.keys()},  # noqa: SIM118  # no dict
             node_sets={key: sets.wholes(key, -1) for key in sets.keys()},  # noqa: SIM118
             structures=_structures(record.record("structures")),
+            capsule=_capsule(record.record("capsule")) if record.has("capsule") else None,
+            ligaments=_ligaments(record.record("ligaments")) if record.has("ligaments") else {},
         )
 
 
@@ -73,6 +79,15 @@ def _material(record: Record) -> Material:
             record.number("density_kg_m3"),
             tuple(record.floats("constants", -1).tolist()) if record.has("constants") else (),
         )
+
+
+def _capsule(record: Record) -> Capsule:
+    with record.building():
+        return Capsule(record.number("young_modulus_kpa"), record.number("thickness_mm"))
+
+
+def _ligaments(record: Record) -> dict[str, float]:
+    return {key: record.number(key) for key in record.keys()}  # noqa: SIM118  # no dict
 
 
 def _structures_table(structures: Structures) -> dict[str, Any]:

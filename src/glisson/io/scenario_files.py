@@ -95,6 +95,7 @@ def _stage(record: Record) -> Stage:
             gravity=record.flag("gravity", Stage.gravity),
             fixed=record.texts("fixed", Stage.fixed),
             moves=tuple(_move(entry) for entry in record.records("moves", ())),
+            gas_pressure_kpa=record.number("gas_pressure_kpa", Stage.gas_pressure_kpa),
         )
 
 
@@ -144,4 +145,5 @@ def _stage_table(stage: Stage) -> dict[str, Any]:
         "fixed": list(stage.fixed),
         "drives": drives,
         "moves": [{"node_set": move.node_set, "displacement_mm": list(move.displacement_mm)} for move in stage.moves],
+        "gas_pressure_kpa": float(stage.gas_pressure_kpa),
     }

@@ -14,6 +14,7 @@ from glisson.core.scenario import ContactLaw
 from glisson.mechanics.contact import ToolContact, Touch
 from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.elements import SurfaceQuadrature, lumped_volumes
+from glisson.mechanics.gas_pressure import GasPressure
 from glisson.mechanics.parts import Part
 from glisson.mechanics.pattern import FreeSystem, Index, Stiffness, block_pattern, pair_slots
 
@@ -59,7 +60,7 @@ class ToolState:
 
 @dataclass(frozen=True, eq=False)
 class LoadState:
-    """What is done to the organ: the tools, dead loads (n, 3) in mN, and how far held unknowns were carried.
+    """What is done to the organ: tools, dead loads (n, 3) in mN, how far held unknowns were carried, gas pressure.
 
     `carried` (n, 3) in mm counts from the stage's start and is zero on free unknowns.
     """
@@ -67,12 +68,14 @@ class LoadState:
     tools: ToolState
     external: FloatArray
     carried: FloatArray
+    gas_pressure_kpa: float = 0.0
 
     def towards(self, goal: "LoadState", share: float) -> "LoadState":
         """A state on the straight way to another one."""
         external = self.external + share * (goal.external - self.external)
         carried = self.carried + share * (goal.carried - self.carried)
-        return LoadState(self.tools.towards(goal.tools, share), external, carried)
+        pressure = self.gas_pressure_kpa + share * (goal.gas_pressure_kpa - self.gas_pressure_kpa)
+        return LoadState(self.tools.towards(goal.tools, share), external, carried, pressure)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +104,7 @@ class Body:
         contacts: one for each tool.
         fixed: (n, 3) which unknowns are held.
         parts: what else acts on the nodes.
+        gas: the gas around it, if there is some.
     """
 
     def __init__(
@@ -110,11 +114,13 @@ class Body:
         contacts: Sequence[ToolContact],
         fixed: NDArray[np.bool_],
         parts: Sequence[Part] = (),
+        gas: GasPressure | None = None,
     ) -> None:
         self.elasticity = elasticity
         self.surface = surface
         self.contacts = tuple(contacts)
-        self.parts = tuple(parts)
+        self.gas = gas
+        self.parts: tuple[Part, ...] = (*parts, *(() if gas is None else (gas,)))
         self.moving = tuple(n for n, contact in enumerate(self.contacts) if contact.tool.moves)
         self.standing = tuple(n for n in range(len(self.contacts)) if n not in self.moving)
         self.external = np.zeros_like(elasticity.rest)
@@ -144,13 +150,23 @@ class Body:
     def loading(self) -> LoadState:
         """The present tools and loads."""
         angles = tuple(contact.angle for contact in self.contacts)
-        return LoadState(ToolState(angles, self.law), self.external, self.carried)
+        pressure = 0.0 if self.gas is None else self.gas.pressure_kpa
+        return LoadState(ToolState(angles, self.law), self.external, self.carried, pressure)
 
     @loading.setter
     def loading(self, state: LoadState) -> None:
         for contact, angle in zip(self.contacts, state.tools.angles, strict=True):
             contact.angle = angle
         self.law, self.external, self.carried = state.tools.law, state.external, state.carried
+        if self.gas is not None:
+            self.gas.pressure_kpa = state.gas_pressure_kpa
+
+    def load_change(self, positions: FloatArray, goal: LoadState) -> FloatArray:
+        """By how much (n, 3) in mN loads of the goal differ from the present ones; tools and what is carried apart."""
+        change: FloatArray = goal.external - self.external
+        if self.gas is not None:
+            change = change + self.gas.forces_at(positions, goal.gas_pressure_kpa - self.gas.pressure_kpa)
+        return change
 
     def touches(self, positions: FloatArray, update_friction: bool = True) -> tuple[Touch, ...]:
         """Where each tool touches; friction limits follow the present pressure unless told not to."""

@@ -9,8 +9,9 @@ from numba import njit
 from scipy.sparse import csr_array
 
 from glisson.core.arrays import FloatArray, IntArray
-from glisson.core.mesh import TET_EDGES, TetMesh
+from glisson.core.mesh import TetMesh
 from glisson.geometry.shape_functions import shape_slopes, shape_values
+from glisson.mechanics.faces import face_nodes, face_values
 
 _OUTER = (5.0 - np.sqrt(5.0)) / 20.0  # of the four-point rule of degree 2 (Keast 1986)
 
@@ -134,25 +135,19 @@ def surface_quadrature(nodes: FloatArray, mesh: TetMesh, parts: IntArray | int =
     Contact is integrated here and not at the nodes, because a nodal contact lets the corners of a tool
     sink between the nodes; areas are those of the shape in `nodes`.
     """
-    triangles, elements = mesh.boundary()
-    face_nodes = triangles
-    if mesh.is_quadratic:
-        face_nodes = np.hstack([triangles, _edge_nodes(mesh, triangles, elements)])
-    corners = nodes[triangles]
+    of_faces = face_nodes(mesh)
+    corners = nodes[of_faces[:, :3]]
     crossed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     doubled = np.linalg.norm(crossed, axis=1)
-    parts = np.broadcast_to(np.asarray(parts), (len(triangles),))
+    parts = np.broadcast_to(np.asarray(parts), (len(of_faces),))
     found = []
     for number in np.unique(parts):
         faces = np.flatnonzero(parts == number)
         barycentric, weights = triangle_rule(int(number))
-        shapes = barycentric
-        if mesh.is_quadratic:
-            pairs = barycentric[:, [0, 1, 2]] * barycentric[:, [1, 2, 0]]
-            shapes = np.hstack([barycentric * (2.0 * barycentric - 1.0), 4.0 * pairs])
+        shapes = face_values(barycentric, mesh.is_quadratic)
         found.append(
             (
-                np.repeat(face_nodes[faces], len(weights), axis=0),
+                np.repeat(of_faces[faces], len(weights), axis=0),
                 np.tile(shapes, (len(faces), 1)),
                 (0.5 * doubled[faces, None] * weights).ravel(),
                 np.repeat(crossed[faces] / doubled[faces, None], len(weights), axis=0),
@@ -180,13 +175,3 @@ def triangle_rule(parts: int) -> tuple[FloatArray, FloatArray]:
         ]
     )
     return points / parts, np.full(len(points), 1.0 / len(points))
-
-
-def _edge_nodes(mesh: TetMesh, triangles: IntArray, elements: IntArray) -> IntArray:
-    """Mid-side nodes (f, 3) of boundary triangles, on the edges 0-1, 1-2 and 2-0."""
-    local = np.argmax(mesh.corners[elements][:, None, :] == triangles[:, :, None], axis=2)
-    edge_of = np.zeros((4, 4), dtype=np.int64)
-    for number, (a, b) in enumerate(TET_EDGES):
-        edge_of[a, b] = edge_of[b, a] = 4 + number
-    columns = edge_of[local, local[:, [1, 2, 0]]]
-    return np.take_along_axis(mesh.tetrahedra[elements], columns, axis=1)

@@ -140,7 +140,7 @@ class Newton:
         body.renew_cohesion(positions)
         touches = body.touches(positions)
         balance = body.balance(positions, touches)
-        change, carried = goal.external - body.external, goal.carried - body.carried
+        change, carried = body.load_change(positions, goal), goal.carried - body.carried
         if carried.any():
             change = change - self._pull(positions, touches, carried)
         change = np.where(body.fixed, 0.0, change)

@@ -15,12 +15,16 @@ from glisson.core.scenario import Board, Scenario
 from glisson.mechanics.body import Body
 from glisson.mechanics.contact import ToolContact
 from glisson.mechanics.contact_law import Cushion
+from glisson.mechanics.elastic_attachments import ElasticAttachments
 from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.elements import SurfaceQuadrature, surface_quadrature
+from glisson.mechanics.gas_pressure import GasPressure
 from glisson.mechanics.initial_gaps import settle_gaps
 from glisson.mechanics.linear_solvers import make_iterative_solver
+from glisson.mechanics.membrane import Membrane
 from glisson.mechanics.newton import Newton, NewtonSettings
 from glisson.mechanics.numbering import numbering
+from glisson.mechanics.parts import Part
 from glisson.mechanics.rest_shape import RestShape, find_rest_shape
 from glisson.mechanics.sampling import face_parts
 from glisson.mechanics.stages import StageRunner, fixed_unknowns, gravity_forces
@@ -103,7 +107,9 @@ class QuasiStatic:
         ]
         settle_gaps(contacts, surface.positions(mesh.nodes), rest.supports, parameters.surface_tolerance_mm)
         elasticity = Elasticity(mesh, model.materials, rest.positions)
-        body = Body(elasticity, surface, contacts, fixed_unknowns(model, scenario.stages[0].fixed))
+        fixed = fixed_unknowns(model, scenario.stages[0].fixed)
+        gas = GasPressure(mesh) if any(stage.gas_pressure_kpa for stage in scenario.stages) else None
+        body = Body(elasticity, surface, contacts, fixed, _parts(model), gas)
         if scenario.rest_shape == "from-gravity":
             body.external = gravity_forces(model, scenario.scan_gravity)
         return body
@@ -121,6 +127,16 @@ class QuasiStatic:
             fixed_unknowns(model, scenario.stages[0].fixed),
             self._parameters.surface_tolerance_mm,
         )
+
+
+def _parts(model: Model) -> list[Part]:
+    """What acts on the organ beside its tissue; all of it is free of force in A."""
+    parts: list[Part] = []
+    if model.capsule is not None:
+        parts.append(Membrane(model.mesh, model.capsule))
+    if model.ligaments:
+        parts.append(ElasticAttachments(model, model.ligaments))
+    return parts
 
 
 def _quadratic(model: Model) -> Model:

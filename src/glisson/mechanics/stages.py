@@ -23,7 +23,7 @@ from glisson.mechanics.tools import LeverTool
 
 _SMALLEST_SHARE = 1.0 / 256.0  # of a stage: smaller load steps are not tried
 _SMALLEST_ANSWER = 1.0 / 16.0
-_LOAD_STEPS = 4  # for a change of gravity, and for a node set that is carried
+_LOAD_STEPS = 4  # for a change of gravity or of the gas pressure, and for a node set that is carried
 _FIRST_SHARE = 0.1  # of a full load step, for the first one: the tool only just comes to bear
 _GROWTH = 2.0
 _STIFFENINGS = 6
@@ -90,7 +90,8 @@ class StageRunner:
         carried = np.zeros_like(self._positions)
         for move in stage.moves:
             carried[self._model.node_set(move.node_set)] = move.displacement_mm
-        end = self._ramp(stage, LoadState(ToolState(tuple(angles), stage.contact), external, carried))
+        tools = ToolState(tuple(angles), stage.contact)
+        end = self._ramp(stage, LoadState(tools, external, carried, stage.gas_pressure_kpa))
         for drive in stage.drives:
             if drive.force_n is not None and end.status is Status.CONVERGED:
                 end = self._lift_by_force(stage, drive.lever, millinewtons_from_newtons(drive.force_n))
@@ -103,7 +104,8 @@ class StageRunner:
         steps = max(int(np.ceil(turn / self._step - 1e-9)), 1)
         heavier = np.linalg.norm(goal.external - start.external) > 1e-9 * np.linalg.norm(goal.external)
         carrying = bool(np.any(goal.carried != start.carried))
-        if heavier or carrying:
+        inflating = goal.gas_pressure_kpa != start.gas_pressure_kpa
+        if heavier or carrying or inflating:
             steps = max(steps, _LOAD_STEPS)
         done, share, may_flow = 0.0, _FIRST_SHARE / steps if turn > 0.0 else 1.0 / steps, not carrying
         while done < 1.0:
@@ -130,7 +132,7 @@ class StageRunner:
         tools = ToolState(
             present.tools.angles if angles is None else tuple(angles), present.tools.law if law is None else law
         )
-        return LoadState(tools, present.external, present.carried)
+        return LoadState(tools, present.external, present.carried, present.gas_pressure_kpa)
 
     def _load_step(self, goal: LoadState) -> NewtonEnd:
         """Equilibrium at the goal; tools, loads and anchors are put back where it is not reached."""

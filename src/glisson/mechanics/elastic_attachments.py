@@ -1,0 +1,73 @@
+"""Ligaments that give way: springs spread over a part of the surface."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from glisson.core.arrays import FloatArray, IntArray
+from glisson.core.model import Model
+from glisson.mechanics.faces import exact_rule, face_nodes, face_values
+
+
+class ElasticAttachments:
+    """A `Part`: faces whose corners all belong to a node set are drawn back to where they are in A.
+
+    Args:
+        model: its mesh and node sets.
+        stiffness_kpa_mm: node set → traction per displacement.
+    """
+
+    def __init__(self, model: Model, stiffness_kpa_mm: Mapping[str, float]) -> None:
+        self._scanned = model.mesh.nodes
+        faces = face_nodes(model.mesh)
+        corners = model.mesh.nodes[faces[:, :3]]
+        crossed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        springs = (
+            0.5
+            * np.linalg.norm(crossed, axis=1)
+            * sum(
+                value * _within(faces, model.node_set(name), len(model.mesh.nodes))
+                for name, value in stiffness_kpa_mm.items()
+            )
+        )
+        self._faces = faces[springs > 0.0]
+        points, weights = exact_rule()
+        values = face_values(points, model.mesh.is_quadratic)
+        shares = np.einsum("q,qa,qb->ab", weights, values, values)
+        self._springs = springs[springs > 0.0][:, None, None] * shares
+
+    def energy(self, positions: FloatArray) -> float:
+        """½ k ∫ |u|² dA in µJ."""
+        away = self._away(positions)
+        return 0.5 * float(np.einsum("fab,fai,fbi->", self._springs, away, away))
+
+    def forces(self, positions: FloatArray) -> FloatArray:
+        """−k u over the faces, as nodal forces (n, 3) in mN."""
+        forces = np.zeros_like(positions)
+        np.add.at(forces, self._faces, -np.einsum("fab,fbi->fai", self._springs, self._away(positions)))
+        return forces
+
+    def stiffness(self, positions: FloatArray, project: bool) -> tuple[IntArray, FloatArray]:
+        """The springs, always definite."""
+        return self._faces, self._springs[..., None, None] * np.eye(3)
+
+    def accept(self, positions: FloatArray) -> None:
+        """Springs remember nothing."""
+
+    def memory(self) -> None:
+        """Nothing."""
+
+    def recall(self, memory: None) -> None:
+        """Nothing is put back."""
+
+    def _away(self, positions: FloatArray) -> FloatArray:
+        return positions[self._faces] - self._scanned[self._faces]
+
+
+def _within(faces: IntArray, nodes: IntArray, count: int) -> NDArray[np.bool_]:
+    """Which faces have all corners among the nodes."""
+    inside = np.zeros(count, dtype=bool)
+    inside[nodes] = True
+    result: NDArray[np.bool_] = inside[faces[:, :3]].all(axis=1)
+    return result
