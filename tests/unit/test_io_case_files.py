@@ -11,6 +11,7 @@ from blocks import block
 from glisson.core import (
     BadInput,
     Board,
+    Capsule,
     ContactLaw,
     ContactReport,
     Curve,
@@ -68,6 +69,7 @@ def scenario() -> Scenario:
         (LeverDrive("lever", force_n=2.5),),
         fixed=("back", "cut"),
         moves=(Move("tip", (1.5, 0.0, -2.0)),),
+        gas_pressure_kpa=1.6,
     )
     return Scenario((board, bedding, lever), (lift, settle), [0, 1, 0], None, ("board",), "as-scanned")
 
@@ -83,6 +85,8 @@ def model(quadratic=False) -> Model:
         {0: "liver", 1: "tumour"},
         {"back": np.array([0, 3, 5]), "none": np.array([], dtype=np.int64)},
         Structures((Tumour("tumour1", surface),), (tree,), Curve(np.random.default_rng(2).random((5, 3))), 31.7),
+        Capsule(900.0, 0.2),
+        {"back": 2.5},
     )
 
 
@@ -131,7 +135,8 @@ def test_the_keys_of_a_scenario_are_the_agreed_ones(tmp_path):
     table = tomllib.loads((tmp_path / "scenario.toml").read_text())
     assert table["schema"] == 1
     assert set(table) == {"schema", "rest_shape", "scan_gravity", "scan_supports", "boards", "levers", "stages"}
-    assert set(table["stages"][0]) == {"name", "friction", "cohesion_kpa", "gravity", "fixed", "drives", "moves"}
+    expected = {"name", "friction", "cohesion_kpa", "gravity", "fixed", "drives", "moves", "gas_pressure_kpa"}
+    assert set(table["stages"][0]) == expected
     assert table["stages"][1]["drives"] == [{"lever": "lever", "force_n": 2.5}]
 
 

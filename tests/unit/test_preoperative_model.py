@@ -1,13 +1,16 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from blocks import block
 from scipy.spatial.transform import Rotation
 
-from glisson.core import Grid, LabelMap, Material, TetMesh
+from glisson.core import BadInput, Grid, LabelMap, Material, TetMesh
 from glisson.preoperative.attachments import (
     BoxAttachment,
     DirectionAttachment,
     attachments_from_tables,
+    ligaments,
     node_sets,
 )
 from glisson.preoperative.label_segmenter import LabelSegmenter, LabelSegmenterParameters
@@ -101,6 +104,17 @@ def test_attachments_from_tables():
     first, second = attachments_from_tables(tables, "case.toml: attachments")
     assert first == BoxAttachment(low_mm=(0.0, 0.0, 0.0), high_mm=(1.0, 2.0, 3.0), name="a")
     assert second == DirectionAttachment("b", ("inferior",), reach=0.2)
+
+
+def test_an_attachment_with_a_stiffness_gives_way_and_all_others_are_fixed(built):
+    _, (model, _) = built
+    softer = replace(model, node_sets={**model.node_sets, "dome": model.node_set("back")}, ligaments={"dome": 3.0})
+    assert [stage.fixed for stage in propose_scenario(softer).stages] == [("back",), ("back",)]
+    assert ligaments((DirectionAttachment("dome", stiffness_kpa_mm=3.0), DirectionAttachment())) == {"dome": 3.0}
+    with pytest.raises(BadInput, match="need the same stiffness_kpa_mm"):
+        ligaments((DirectionAttachment(stiffness_kpa_mm=3.0), DirectionAttachment()))
+    with pytest.raises(BadInput, match="Nothing holds the organ"):
+        propose_scenario(replace(model, node_sets={}))
 
 
 def lowest_gap(lever, mesh: TetMesh) -> float:

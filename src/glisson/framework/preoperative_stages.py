@@ -75,7 +75,11 @@ class MeshStage(Stage):
         """Parameters of surface extractor and mesher, materials and attachments."""
         materials = {name: asdict(material) for name, material in settings.materials.items()}
         attachments = [asdict(attachment) for attachment in settings.attachments]
-        return self._tetrahedra_settings(settings) | {"materials": materials, "attachments": attachments}
+        return self._tetrahedra_settings(settings) | {
+            "materials": materials,
+            "attachments": attachments,
+            "capsule": asdict(settings.capsule),
+        }
 
     def techniques(self, settings: Settings) -> Sequence[tuple[str, str]]:
         """Surface extractor and mesher."""
@@ -97,7 +101,7 @@ class MeshStage(Stage):
         if before is not None and before.facts.get("tetrahedra_from") == made_from and case.has(MODEL):
             mesher = _KeptTetrahedra(read_model(case.path(MODEL)).mesh)
         extractor = settings.choices["surface"].make(SETTINGS, settings.seed)
-        model_settings = ModelSettings(settings.materials, settings.attachments)
+        model_settings = ModelSettings(settings.materials, settings.attachments, settings.capsule.made())
         model, report = build_model(organ, tumours, structures, extractor, mesher, model_settings, progress)
         write_model(out / MODEL, model)
         return _mesh_facts(report) | {"tetrahedra_from": made_from}

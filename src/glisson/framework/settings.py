@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Any
 
 from glisson.core.errors import BadInput
-from glisson.core.model import Material
+from glisson.core.model import Capsule, Material
 from glisson.core.parameters import build_parameters, parameter
 from glisson.core.registry import technique_class
 from glisson.preoperative.attachments import DEFAULT_ATTACHMENTS, Attachment
@@ -87,8 +87,27 @@ class PlaneSettings:
     )
 
 
+@dataclass(frozen=True)
+class CapsuleSettings:
+    """The organ's skin."""
+
+    young_modulus_kpa: float | None = parameter(
+        None, "Young's modulus of the capsule, an elastic membrane on the surface (kPa); none: no capsule.", 0.0, 1e6
+    )
+    thickness_mm: float = parameter(0.1, "Thickness of the capsule (mm).", 1e-3, 9.0)
+
+    def made(self) -> Capsule | None:
+        """The capsule; None where there is none."""
+        return None if self.young_modulus_kpa is None else Capsule(self.young_modulus_kpa, self.thickness_mm)
+
+
 SECTIONS: Mapping[str, type[Any]] = MappingProxyType(
-    {"segment": SegmentSettings, "plane": PlaneSettings, "scenario": LeverLiftParameters}
+    {
+        "segment": SegmentSettings,
+        "capsule": CapsuleSettings,
+        "plane": PlaneSettings,
+        "scenario": LeverLiftParameters,
+    }
 )
 """Section of `case.toml` → dataclass of the keys that are ours there, beside those of a technique."""
 
@@ -111,6 +130,7 @@ class Settings:
     materials: Mapping[str, Material] = field(default_factory=lambda: {ORGAN: HUMAN_LIVER})
     attachments: tuple[Attachment, ...] = DEFAULT_ATTACHMENTS
     segment: SegmentSettings = field(default_factory=SegmentSettings)
+    capsule: CapsuleSettings = field(default_factory=CapsuleSettings)
     plane: PlaneSettings = field(default_factory=PlaneSettings)
     scenario: LeverLiftParameters = field(default_factory=LeverLiftParameters)
     target: str | None = None

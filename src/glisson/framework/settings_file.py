@@ -37,6 +37,7 @@ _ABOUT = {
     "surface": "The closed surface of the liver's mask.",
     "mesh": "The tetrahedra inside the surface.",
     "simulate": "The solver of the manoeuvre that scenario.toml describes.",
+    "capsule": "Glisson's capsule around the organ; materials of the regions inside it are further down.",
     "plane": "The resection plane; the side of the target is removed.",
     "scenario": "The manoeuvre that is proposed where nobody wrote or changed scenario.toml.",
 }
@@ -149,7 +150,8 @@ def _attachments(table: Mapping[str, Any], where: str) -> tuple[Attachment, ...]
 
 def _attachment_tables(attachments: Sequence[Attachment]) -> list[dict[str, Any]]:
     return [
-        {"kind": "box" if isinstance(entry, BoxAttachment) else "direction", **_plain(asdict(entry))}
+        {"kind": "box" if isinstance(entry, BoxAttachment) else "direction"}
+        | {key: _plain(value) for key, value in asdict(entry).items() if value is not None}
         for entry in attachments
     ]
 
@@ -207,6 +209,7 @@ def _attachments_text(settings: Settings) -> str:
     about = (
         "# What holds the organ: surface nodes furthest along some directions (left, right, posterior, anterior,\n"
         '# superior, inferior), or those in a box: kind = "box", low_mm = [x, y, z], high_mm = [x, y, z].\n'
+        "# Held fast, unless stiffness_kpa_mm says with what pull per area and displacement a ligament gives way.\n"
     )
     tables = [_table_text("[[attachments]]", table) for table in _attachment_tables(settings.attachments)]
     return about + "\n".join(tables)

@@ -13,6 +13,8 @@ from glisson.mechanics.faces import exact_rule, face_nodes, face_values
 class ElasticAttachments:
     """A `Part`: faces whose corners all belong to a node set are drawn back to where they are in A.
 
+    What they bear in A, where the organ hangs on them, they go on bearing; see `settle`.
+
     Args:
         model: its mesh and node sets.
         stiffness_kpa_mm: node set → traction per displacement.
@@ -23,34 +25,38 @@ class ElasticAttachments:
         faces = face_nodes(model.mesh)
         corners = model.mesh.nodes[faces[:, :3]]
         crossed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        springs = (
-            0.5
-            * np.linalg.norm(crossed, axis=1)
-            * sum(
-                value * _within(faces, model.node_set(name), len(model.mesh.nodes))
-                for name, value in stiffness_kpa_mm.items()
-            )
-        )
+        springs = np.zeros(len(faces))
+        for name, stiffness in stiffness_kpa_mm.items():
+            within = _within(faces, model.node_set(name), len(model.mesh.nodes))
+            springs += 0.5 * stiffness * np.linalg.norm(crossed, axis=1) * within
         self._faces = faces[springs > 0.0]
         points, weights = exact_rule()
         values = face_values(points, model.mesh.is_quadratic)
         shares = np.einsum("q,qa,qb->ab", weights, values, values)
         self._springs = springs[springs > 0.0][:, None, None] * shares
+        self._borne = np.zeros_like(self._scanned)
+
+    def settle(self, unbalanced: FloatArray) -> None:
+        """Bear in A what is left (n, 3) in mN of all other forces on their nodes."""
+        nodes = np.unique(self._faces)
+        self._borne[nodes] = -unbalanced[nodes]
 
     def energy(self, positions: FloatArray) -> float:
-        """½ k ∫ |u|² dA in µJ."""
+        """½ k ∫ |u|² dA, less the work of what they bear, in µJ."""
         away = self._away(positions)
-        return 0.5 * float(np.einsum("fab,fai,fbi->", self._springs, away, away))
+        stretched = 0.5 * float(np.einsum("fab,fai,fbi->", self._springs, away, away))
+        return stretched - float(np.vdot(self._borne, positions - self._scanned))
 
     def forces(self, positions: FloatArray) -> FloatArray:
-        """−k u over the faces, as nodal forces (n, 3) in mN."""
-        forces = np.zeros_like(positions)
+        """What they bear and −k u over the faces, as nodal forces (n, 3) in mN."""
+        forces = self._borne.copy()
         np.add.at(forces, self._faces, -np.einsum("fab,fbi->fai", self._springs, self._away(positions)))
         return forces
 
     def stiffness(self, positions: FloatArray, project: bool) -> tuple[IntArray, FloatArray]:
         """The springs, always definite."""
-        return self._faces, self._springs[..., None, None] * np.eye(3)
+        local: FloatArray = self._springs[..., None, None] * np.eye(3)
+        return self._faces, local
 
     def accept(self, positions: FloatArray) -> None:
         """Springs remember nothing."""
@@ -62,12 +68,13 @@ class ElasticAttachments:
         """Nothing is put back."""
 
     def _away(self, positions: FloatArray) -> FloatArray:
-        return positions[self._faces] - self._scanned[self._faces]
+        away: FloatArray = positions[self._faces] - self._scanned[self._faces]
+        return away
 
 
 def _within(faces: IntArray, nodes: IntArray, count: int) -> NDArray[np.bool_]:
     """Which faces have all corners among the nodes."""
     inside = np.zeros(count, dtype=bool)
     inside[nodes] = True
-    result: NDArray[np.bool_] = inside[faces[:, :3]].all(axis=1)
+    result: NDArray[np.bool_] = np.all(inside[faces[:, :3]], axis=1)
     return result

@@ -8,7 +8,9 @@ from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.mesh import TetMesh
 from glisson.mechanics.faces import exact_rule, face_nodes, face_slopes, face_values
 
-_SIGNS = {(0, 1, 2): 1.0, (1, 2, 0): 1.0, (2, 0, 1): 1.0, (0, 2, 1): -1.0, (2, 1, 0): -1.0, (1, 0, 2): -1.0}
+_ORDERS = tuple(permutations(range(3)))
+_SIGNS = (1.0, -1.0, -1.0, 1.0, 1.0, -1.0)
+"""Even and odd orders of three things."""
 
 
 class GasPressure:
@@ -51,7 +53,7 @@ class GasPressure:
         arms = 6.0 * self.pressure_kpa * np.einsum("abc,fci->fabi", self._constants, places)
         local = np.zeros((*arms.shape, 3))
         # ∂(x_b × x_c)/∂x_b is −[x_c]×, the matrix of the product with x_c.
-        for (i, j, k), sign in _SIGNS.items():
+        for (i, j, k), sign in zip(_ORDERS, _SIGNS, strict=True):
             local[..., i, j] += sign * arms[..., k]
         return self._faces, local
 
@@ -76,7 +78,5 @@ def _constants(quadratic: bool) -> FloatArray:
     points, weights = exact_rule()
     values, slopes = face_values(points, quadratic), face_slopes(points, quadratic)
     plain = np.einsum("q,qa,qb,qc->abc", 0.5 * weights, values, slopes[:, :, 0], slopes[:, :, 1]) / 3.0
-    whole = np.zeros_like(plain)
-    for order in permutations(range(3)):
-        whole += _SIGNS[order] / 6.0 * plain.transpose(order)
+    whole: FloatArray = sum(sign / 6.0 * plain.transpose(order) for order, sign in zip(_ORDERS, _SIGNS, strict=True))
     return whole

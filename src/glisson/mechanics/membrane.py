@@ -52,9 +52,8 @@ class Membrane:
         tangent = _tangent(self._deformation(positions))
         if project:
             values, vectors = np.linalg.eigh(tangent.reshape(*tangent.shape[:2], 6, 6))
-            tangent = ((vectors * np.maximum(values, 0.0)[..., None, :]) @ vectors.swapaxes(2, 3)).reshape(
-                tangent.shape
-            )
+            definite = (vectors * np.maximum(values, 0.0)[..., None, :]) @ vectors.swapaxes(2, 3)
+            tangent = definite.reshape(tangent.shape)
         half = np.einsum("fqidke,fqbe->fqidkb", tangent, self._gradients)
         local = np.einsum("fq,fqad,fqidkb->fabik", self._weights, self._gradients, half)
         return self._faces, local

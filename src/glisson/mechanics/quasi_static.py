@@ -24,7 +24,6 @@ from glisson.mechanics.linear_solvers import make_iterative_solver
 from glisson.mechanics.membrane import Membrane
 from glisson.mechanics.newton import Newton, NewtonSettings
 from glisson.mechanics.numbering import numbering
-from glisson.mechanics.parts import Part
 from glisson.mechanics.rest_shape import RestShape, find_rest_shape
 from glisson.mechanics.sampling import face_parts
 from glisson.mechanics.stages import StageRunner, fixed_unknowns, gravity_forces
@@ -108,10 +107,14 @@ class QuasiStatic:
         settle_gaps(contacts, surface.positions(mesh.nodes), rest.supports, parameters.surface_tolerance_mm)
         elasticity = Elasticity(mesh, model.materials, rest.positions)
         fixed = fixed_unknowns(model, scenario.stages[0].fixed)
+        ligaments = ElasticAttachments(model, model.ligaments)
         gas = GasPressure(mesh) if any(stage.gas_pressure_kpa for stage in scenario.stages) else None
-        body = Body(elasticity, surface, contacts, fixed, _parts(model), gas)
+        capsule = () if model.capsule is None else (Membrane(mesh, model.capsule),)
+        parts = (*capsule, *((ligaments,) if model.ligaments else ()))
+        body = Body(elasticity, surface, contacts, fixed, parts, gas)
         if scenario.rest_shape == "from-gravity":
             body.external = gravity_forces(model, scenario.scan_gravity)
+            ligaments.settle(body.balance(mesh.nodes, body.touches(mesh.nodes)).unbalanced)
         return body
 
     def _rest_shape(self, model: Model, scenario: Scenario, surface: SurfaceQuadrature) -> RestShape:
@@ -124,19 +127,9 @@ class QuasiStatic:
             gravity_forces(model, scenario.scan_gravity),
             supports,
             surface,
-            fixed_unknowns(model, scenario.stages[0].fixed),
+            fixed_unknowns(model, (*scenario.stages[0].fixed, *model.ligaments)),
             self._parameters.surface_tolerance_mm,
         )
-
-
-def _parts(model: Model) -> list[Part]:
-    """What acts on the organ beside its tissue; all of it is free of force in A."""
-    parts: list[Part] = []
-    if model.capsule is not None:
-        parts.append(Membrane(model.mesh, model.capsule))
-    if model.ligaments:
-        parts.append(ElasticAttachments(model, model.ligaments))
-    return parts
 
 
 def _quadratic(model: Model) -> Model:

@@ -28,6 +28,13 @@ DIRECTIONS = {
 """Anatomical directions in LPS."""
 
 
+def _stiffness() -> float | None:
+    """The field of an attachment that says how much it gives way."""
+    help_text = "Pull per area and displacement of a ligament that gives way (kPa/mm); none: held fast."
+    stiffness: float | None = parameter(None, help_text, 1e-6, 1e6)
+    return stiffness
+
+
 @dataclass(frozen=True)
 class BoxAttachment:
     """All surface nodes inside a box that is aligned with the patient's axes (LPS mm)."""
@@ -35,6 +42,7 @@ class BoxAttachment:
     low_mm: tuple[float, float, float]
     high_mm: tuple[float, float, float]
     name: str = parameter("back", "Name of the node set.")
+    stiffness_kpa_mm: float | None = _stiffness()
 
     def __post_init__(self) -> None:
         if not all(low < high for low, high in zip(self.low_mm, self.high_mm, strict=True)):
@@ -65,6 +73,7 @@ class DirectionAttachment:
     left_limit: float = parameter(
         0.55, "Only nodes up to this fraction of the organ's width, from its right side (1: all).", 0.0, 1.0
     )
+    stiffness_kpa_mm: float | None = _stiffness()
 
     def __post_init__(self) -> None:
         unknown = [direction for direction in self.directions if direction not in DIRECTIONS]
@@ -122,6 +131,22 @@ def node_sets(mesh: TetMesh, attachments: Sequence[Attachment]) -> dict[str, Int
             raise BadInput(f"Attachment {attachment.name!r} holds {_count(len(nodes))}; the organ {_box(points)}.")
         sets[attachment.name] = np.union1d(sets.get(attachment.name, nodes), nodes)
     return sets
+
+
+def ligaments(attachments: Sequence[Attachment]) -> dict[str, float]:
+    """Stiffness in kPa/mm of each attachment that gives way, by its name.
+
+    Raises:
+        BadInput: attachments of one name differ in it.
+    """
+    stiffness = {attachment.name: attachment.stiffness_kpa_mm for attachment in attachments}
+    for attachment in attachments:
+        if attachment.stiffness_kpa_mm != stiffness[attachment.name]:
+            raise BadInput(
+                f"Attachments named {attachment.name!r} are one node set and need the same stiffness_kpa_mm; "
+                "give them different names."
+            )
+    return {name: value for name, value in stiffness.items() if value is not None}
 
 
 def _along(fractions: FloatArray, direction: str) -> FloatArray:

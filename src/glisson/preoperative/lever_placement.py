@@ -36,6 +36,9 @@ class LeverLiftParameters:
     angle_deg: float = parameter(22.0, "Angle to which the lever is lifted.", 0.0, 60.0)
     friction: float = parameter(0.1, "Coefficient of friction of board and lever.", 0.0, 2.0)
     cohesion_kpa: float = parameter(10.0, "Cohesion in stage 1, kPa; stage 2 has none.", 0.0, 1000.0)
+    gas_pressure_kpa: float = parameter(
+        0.0, "Pressure of the pneumoperitoneum in both stages, kPa; 12 mmHg are 1.6.", 0.0, 20.0
+    )
     lobe_fraction: float = parameter(
         0.25, "The left lobe is at most this fraction of the organ's volume, from its left end.", 0.05, 0.6
     )

@@ -5,6 +5,7 @@ The board is tangent to the organ's underside; the lever lies under the left lob
 
 import numpy as np
 
+from glisson.core.errors import BadInput
 from glisson.core.mesh import TetMesh
 from glisson.core.model import Model
 from glisson.core.scenario import Board, ContactLaw, LeverDrive, Scenario, Stage
@@ -15,13 +16,16 @@ def propose_scenario(model: Model, parameters: LeverLiftParameters | None = None
     """Board, lever under the left lobe, and the two stages: lifted with sticky contact, then settled.
 
     Stage 1 has friction and cohesion, stage 2 friction only, so that the lobe slides (both under gravity).
-    The node set "back" is fixed.
+    Every node set that is no ligament is fixed.
 
     Raises:
-        BadInput: the model has no node set "back", or no place under the left lobe suits a lever.
+        BadInput: nothing holds the organ, or no place under the left lobe suits a lever.
     """
     chosen = LeverLiftParameters() if parameters is None else parameters
-    model.node_set("back")
+    if not model.node_sets:
+        raise BadInput("Nothing holds the organ: the model has no node set; name attachments.")
+    fixed = tuple(name for name in model.node_sets if name not in model.ligaments)
+    gas = chosen.gas_pressure_kpa
     board = Board(
         "board", np.array([0.0, _board_height(model.mesh, chosen.board_depth_mm), 0.0]), -DOWN, conforming=True
     )
@@ -29,8 +33,8 @@ def propose_scenario(model: Model, parameters: LeverLiftParameters | None = None
     return Scenario(
         tools=(board, place_lever(model.mesh, chosen)),
         stages=(
-            Stage("stage 1", ContactLaw(chosen.friction, chosen.cohesion_kpa), (lift,)),
-            Stage("stage 2", ContactLaw(chosen.friction, 0.0)),
+            Stage("stage 1", ContactLaw(chosen.friction, chosen.cohesion_kpa), (lift,), True, fixed, (), gas),
+            Stage("stage 2", ContactLaw(chosen.friction, 0.0), (), True, fixed, (), gas),
         ),
         scan_gravity=DOWN,
         surgery_gravity=DOWN,

@@ -11,10 +11,10 @@ from scipy import ndimage
 from glisson.core.errors import BadInput, StageFailed
 from glisson.core.image import LabelMap
 from glisson.core.mesh import TetMesh
-from glisson.core.model import Material, Model
+from glisson.core.model import Capsule, Material, Model
 from glisson.core.protocols import Mesher, Progress, SurfaceExtractor, silent
 from glisson.core.status import Status
-from glisson.preoperative.attachments import DEFAULT_ATTACHMENTS, Attachment, node_sets
+from glisson.preoperative.attachments import DEFAULT_ATTACHMENTS, Attachment, ligaments, node_sets
 from glisson.preoperative.borders import touched_borders
 from glisson.preoperative.components import single_part
 from glisson.preoperative.mesh_quality import MeshQuality, mesh_quality
@@ -48,6 +48,7 @@ class ModelSettings:
 
     materials: Mapping[str, Material] = field(default_factory=lambda: {ORGAN: HUMAN_LIVER})
     attachments: tuple[Attachment, ...] = DEFAULT_ATTACHMENTS
+    capsule: Capsule | None = None
 
     def __post_init__(self) -> None:
         if ORGAN not in self.materials:
@@ -121,6 +122,8 @@ def build_model(
         region_names=names,
         node_sets=node_sets(mesh, settings.attachments),
         structures=build_structures(LabelMap(whole.astype(np.uint8), organ.grid, {1: ORGAN}), tumours, structures),
+        capsule=settings.capsule,
+        ligaments=ligaments(settings.attachments),
     )
     notes = [f"A separate crumb of the mask was left out: {crumb.place}." for crumb in crumbs[:5]]
     notes += [border.sentence for border in touched_borders(whole)] + _tumour_notes(model, tumours)

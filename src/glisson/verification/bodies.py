@@ -14,8 +14,10 @@ from glisson.mechanics.contact import ToolContact
 from glisson.mechanics.contact_law import Cushion
 from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.elements import surface_quadrature
+from glisson.mechanics.gas_pressure import GasPressure
 from glisson.mechanics.linear_solvers import make_direct_solver
 from glisson.mechanics.newton import Newton, NewtonEnd, NewtonSettings
+from glisson.mechanics.parts import Part
 from glisson.mechanics.tools import RigidTool, make_tool
 from glisson.verification.check import NoSolution
 
@@ -82,14 +84,16 @@ def body_of(
     cushion: Cushion | None = None,
     stick_mm: float = 0.005,
     tools: Sequence[RigidTool] = (),
+    parts: Sequence[Part] = (),
+    gas: GasPressure | None = None,
 ) -> Body:
-    """A mechanical system of one material, on boards and other tools."""
+    """A mechanical system of one material, on boards and other tools, with parts and in a gas."""
     surface = surface_quadrature(mesh.nodes, mesh)
     cushion = cushion or Cushion(0.1, 2000.0)
     everything = [*(make_tool(board) for board in boards), *tools]
     contacts = [ToolContact(tool, surface, cushion, stick_mm) for tool in everything]
     fixed = np.zeros(mesh.nodes.shape, dtype=bool) if fixed is None else fixed
-    return Body(Elasticity(mesh, {0: material}, mesh.nodes), surface, contacts, fixed)
+    return Body(Elasticity(mesh, {0: material}, mesh.nodes), surface, contacts, fixed, parts, gas)
 
 
 def floor(height: float = 0.0) -> Board:

@@ -1,14 +1,24 @@
-"""Round bodies: discs of triangles, and tetrahedra between layers of them."""
+"""Round bodies: discs of triangles, tetrahedra between layers of them, and a ball."""
 
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial import Delaunay
+from scipy.spatial import ConvexHull, Delaunay
 
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.mesh import TET_EDGES, TetMesh
 
 Lengths = Sequence[float] | FloatArray
+
+_BETWEEN = {frozenset((int(a), int(b))): 4 + n for n, (a, b) in enumerate(TET_EDGES)}  # T10's middle nodes
+_OPPOSITE = [(_BETWEEN[frozenset((0, 1))], _BETWEEN[frozenset((2, 3))])]  # the diagonal of the inner octahedron
+_RING = [_BETWEEN[frozenset(ends)] for ends in ((0, 2), (1, 2), (1, 3), (0, 3))]
+_EIGHTHS = np.array(
+    [
+        *([c, *(_BETWEEN[frozenset((c, other))] for other in range(4) if other != c)] for c in range(4)),
+        *([*_OPPOSITE[0], _RING[n], _RING[(n + 1) % 4]] for n in range(4)),
+    ]
+)
 
 
 def disc(radii: Lengths, counts: Sequence[int], angle: float = 2.0 * np.pi) -> tuple[FloatArray, IntArray]:
@@ -51,10 +61,7 @@ def extruded(points: FloatArray, triangles: IntArray, heights: Lengths) -> TetMe
         axis=1,
     ).reshape(-1, 4)
     tetrahedra = np.vstack([prism + layer * count for layer in range(len(heights) - 1)])
-    p = nodes[tetrahedra]
-    volumes = np.linalg.det(p[:, 1:] - p[:, :1])
-    tetrahedra = np.where(volumes[:, None] < 0.0, tetrahedra[:, [1, 0, 2, 3]], tetrahedra)
-    return TetMesh(nodes, tetrahedra)
+    return _positive(nodes, tetrahedra)
 
 
 def rounded(mesh: TetMesh, radius_mm: float) -> TetMesh:
@@ -65,3 +72,37 @@ def rounded(mesh: TetMesh, radius_mm: float) -> TetMesh:
     nodes = np.array(mesh.nodes)
     nodes[middles, :2] *= (radius_mm / reach[middles])[:, None]
     return TetMesh(nodes, mesh.tetrahedra, mesh.regions)
+
+
+def ball(radius_mm: float, refinements: int) -> TetMesh:
+    """T10 mesh of a ball about the origin: an icosahedron cut in 20 · 8ʳ tetrahedra, its boundary's nodes put on it."""
+    golden = 0.5 * (1.0 + np.sqrt(5.0))
+    corners = [(0.0, a, b * golden) for a in (-1.0, 1.0) for b in (-1.0, 1.0)]
+    outside = np.array([np.roll(corner, turn) for corner in corners for turn in range(3)])
+    nodes = np.vstack([np.zeros((1, 3)), outside / np.linalg.norm(outside[0])])
+    faces = 1 + ConvexHull(nodes[1:]).simplices
+    mesh = _positive(nodes, np.column_stack([np.zeros(len(faces), dtype=np.int64), faces]))
+    for _ in range(refinements):
+        mesh = _cut_in_eight(mesh)
+    mesh = mesh.as_quadratic()
+    # On shells of equal distance on every ray; a flat face of the icosahedron has a distance of 1 inside it.
+    normals = nodes[faces].mean(axis=1)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    depth = (mesh.nodes @ normals.T).max(axis=1) / float((nodes[faces[0]] @ normals[0]).mean())
+    lengths = np.linalg.norm(mesh.nodes, axis=1)
+    places = mesh.nodes * (radius_mm * depth / np.maximum(lengths, 1e-12))[:, None]
+    return TetMesh(places, mesh.tetrahedra)
+
+
+def _cut_in_eight(mesh: TetMesh) -> TetMesh:
+    """A T4 mesh with every element cut at the middles of its edges."""
+    quadratic = mesh.as_quadratic()
+    parts = quadratic.tetrahedra[:, _EIGHTHS].reshape(-1, 4)
+    return _positive(quadratic.nodes, parts)
+
+
+def _positive(nodes: FloatArray, tetrahedra: IntArray) -> TetMesh:
+    """A T4 mesh with elements of negative volume turned round."""
+    p = nodes[tetrahedra]
+    volumes = np.linalg.det(p[:, 1:] - p[:, :1])
+    return TetMesh(nodes, np.where(volumes[:, None] < 0.0, tetrahedra[:, [1, 0, 2, 3]], tetrahedra))

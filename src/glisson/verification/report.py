@@ -21,6 +21,7 @@ TITLES = {
     "hertz": "Hertz contact",
     "friction": "Friction and cohesion",
     "capstan": "Belt friction",
+    "parts": "Capsule, gas and ligaments",
     "rigid": "Rigid rotation",
     "energy": "Energy balance",
     "taylor": "Taylor tests",

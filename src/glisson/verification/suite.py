@@ -17,6 +17,7 @@ from glisson.verification import (
     inflation,
     manufactured,
     mestdagh,
+    parts,
     patch,
     rigid,
     taylor,
@@ -26,7 +27,7 @@ from glisson.verification.check import PREFIXES, Case, Check
 
 _FAMILIES = (
     *(patch, manufactured, closed_forms, torsion, inflation, cook, elastica, hertz, friction, capstan),
-    *(rigid, energy, taylor, mestdagh, calculix),
+    *(parts, rigid, energy, taylor, mestdagh, calculix),
 )
 CASES: tuple[Case, ...] = tuple(
     sorted((case for family in _FAMILIES for case in family.CASES), key=lambda case: PREFIXES.index(case.prefix))

@@ -8,14 +8,17 @@ import numpy as np
 
 from glisson.core.arrays import FloatArray
 from glisson.core.mesh import TetMesh
-from glisson.core.model import Material
+from glisson.core.model import Capsule, Material
 from glisson.core.scenario import ContactLaw, Lever
 from glisson.mechanics.body import Body
 from glisson.mechanics.contact import Touch
 from glisson.mechanics.contact_law import Cushion, shear_share, shear_slope, slip_energy
 from glisson.mechanics.cylinder import CylinderTool
 from glisson.mechanics.elasticity import Elasticity
+from glisson.mechanics.gas_pressure import GasPressure
 from glisson.mechanics.materials.law import find_law
+from glisson.mechanics.membrane import Membrane
+from glisson.mechanics.parts import Part
 from glisson.mechanics.pattern import block_pattern
 from glisson.mechanics.tools import LeverTool, RigidTool, make_tool
 from glisson.verification.bodies import FRAME_INDIFFERENT, LAWS, body_of, box_mesh, distorted, floor, material_of
@@ -82,6 +85,33 @@ def _body(name: str, law_name: str) -> list[Check]:
         taylor_check(f"{name}/stiffness", force_rest, (1e-3, 1e-4)),
         taylor_check(f"{name}/unloaded-shape", shape_rest, (1e-2, 1e-3)),
     ]
+
+
+def _part(name: str, make: Callable[[TetMesh], Part]) -> list[Check]:
+    """Forces and stiffness of a part of the body."""
+    mesh, positions, direction = _bent()
+    part = make(mesh)
+    energy, forces = part.energy(positions), part.forces(positions)
+    groups, local = part.stiffness(positions, project=False)
+    change = np.zeros_like(positions)
+    np.add.at(change, groups, np.einsum("kabij,kbj->kai", local, direction[groups]))
+
+    def energy_rest(h: float) -> float:
+        return part.energy(positions + h * direction) - energy + h * float(np.vdot(forces, direction))
+
+    def force_rest(h: float) -> Any:
+        return part.forces(positions + h * direction) - forces + h * change
+
+    return [
+        taylor_check(f"{name}/forces", energy_rest, (1e-1, 1e-2)),
+        taylor_check(f"{name}/stiffness", force_rest, (1e-2, 1e-3)),
+    ]
+
+
+def _gas(mesh: TetMesh) -> GasPressure:
+    gas = GasPressure(mesh)
+    gas.pressure_kpa = 2.0
+    return gas
 
 
 def _times(body: Body, blocks: FloatArray, direction: FloatArray) -> FloatArray:
@@ -192,6 +222,10 @@ _CONTACTS = {
     "lever-cohesion": (ContactLaw(0.3, 2.0), _EDGE),
     "cylinder-friction": (ContactLaw(0.3), _ROUND),
 }
+_PARTS: dict[str, Callable[[TetMesh], Part]] = {
+    "capsule": lambda mesh: Membrane(mesh, Capsule(young_modulus_kpa=300.0, thickness_mm=0.2)),
+    "gas": _gas,
+}
 
 CASES = (
     *(Case(f"taylor/law/{law}", f"stress and tangent, {law}", partial(_law, f"taylor/law/{law}", law)) for law in LAWS),
@@ -207,6 +241,11 @@ CASES = (
         Case(name, f"a block that presses on a tool, {what}", partial(_contact, name, law, tool))
         for what, (law, tool) in _CONTACTS.items()
         for name in [f"taylor/contact/{what}"]
+    ),
+    *(
+        Case(name, f"forces and stiffness of the {what} of a T10 body", partial(_part, name, make))
+        for what, make in _PARTS.items()
+        for name in [f"taylor/part/{what}"]
     ),
     Case("taylor/contact-law", "pressure over gap, shear over slip", partial(_cushion, "taylor/contact-law")),
     *(

@@ -1,0 +1,108 @@
+"""Capsule, gas and ligaments as a scenario and a model name them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from glisson.core import Capsule, ContactLaw, Material, Model, Move, Scenario, Stage, Status
+from glisson.core.mesh import TetMesh
+from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
+from glisson.verification.bodies import box_mesh, box_model
+from glisson.verification.closed_forms import uniaxial
+
+SOFT = Material("neo-hookean", 7.0, 0.4)
+FREE = ContactLaw()
+SIZES = np.array([30.0, 20.0, 10.0])
+DOWN = np.array([0.0, 0.0, -1.0])
+
+
+def _model(**changes: object) -> Model:
+    mesh = box_mesh(SIZES, (3, 2, 2))
+    x = mesh.nodes[:, 0]
+    model = box_model(mesh, SOFT, left=np.flatnonzero(x == 0.0), right=np.flatnonzero(x == SIZES[0]))
+    return replace(model, **changes)
+
+
+def _solved(model: Model, *stages: Stage, **scenario: object):
+    made = Scenario((), stages, **{"rest_shape": "as-scanned", **scenario})
+    return QuasiStatic(QuasiStaticParameters(tolerance=1e-9)).solve(model, made)
+
+
+def test_an_organ_on_ligaments_stays_as_scanned_until_something_changes() -> None:
+    """What ligaments bear in the scan they go on bearing, as if they were fast; without gravity they draw it up."""
+    rigid = replace(SOFT, young_modulus_kpa=7e3)
+    model = replace(_model(ligaments={"left": 5.0, "right": 5.0}), materials={0: rigid})
+    loads = {"rest_shape": "from-gravity", "scan_gravity": DOWN, "surgery_gravity": DOWN}
+    answer = _solved(model, Stage("still", FREE, fixed=()), Stage("weightless", FREE, fixed=(), gravity=False), **loads)
+    assert answer.status is Status.CONVERGED, answer.message
+    np.testing.assert_allclose(answer.stages[0].displacement, 0.0, atol=1e-6)
+    # The springs rise by the weight over their stiffness.
+    weight = 1150e-9 * 9.80665e3 * SIZES.prod()  # mN
+    mesh = answer.mesh
+    side = mesh.nodes[:, 0] == 0.0
+    rise = answer.stages[1].displacement[side, 2].mean()
+    assert rise == pytest.approx(weight / (2.0 * 5.0 * SIZES[1] * SIZES[2]), rel=0.02)
+
+
+def test_stiff_ligaments_hold_as_fixed_ones() -> None:
+    pull = (Move("right", (4.0, 0.0, -3.0)),)
+    fast = _solved(_model(), Stage("pull", FREE, gravity=False, fixed=("left",), moves=pull))
+    stiff = _solved(_model(ligaments={"left": 1e6}), Stage("pull", FREE, gravity=False, fixed=(), moves=pull))
+    assert fast.status is stiff.status is Status.CONVERGED
+    np.testing.assert_allclose(stiff.displacement, fast.displacement, atol=1e-4)
+
+
+def test_gas_comes_and_goes() -> None:
+    """Let out, the organ is as it was; while it presses the mean squeeze is that of the bulk modulus."""
+    quiet = {"gravity": False, "fixed": ("left",)}
+    answer = _solved(_model(), Stage("in", FREE, gas_pressure_kpa=1.6, **quiet), Stage("out", FREE, **quiet))
+    assert answer.status is Status.CONVERGED
+    np.testing.assert_allclose(answer.displacement, 0.0, atol=1e-6)
+    mesh = answer.mesh
+    squeezed = TetMesh(mesh.nodes + answer.stages[0].displacement, mesh.tetrahedra)
+    # A held end lets an even squeeze through only in part.
+    lost = 1.0 - squeezed.volume_mm3 / mesh.volume_mm3
+    assert 0.7 < lost / (1.6 / SOFT.bulk_modulus_kpa) < 1.0
+
+
+def test_a_capsule_bears_its_share_of_a_pull() -> None:
+    """A bar of next to nothing in a skin stores what the skin stores.
+
+    That lies between a skin that narrows freely and one that cannot.
+    """
+    skin = Capsule(young_modulus_kpa=300.0, thickness_mm=0.1)
+    stretch = 1.1
+    faint = replace(SOFT, young_modulus_kpa=1e-2, poisson_ratio=0.0)
+    model = replace(_model(), materials={0: faint}, capsule=skin)
+    moves = (Move("right", ((stretch - 1.0) * SIZES[0], 0.0, 0.0)),)
+    answer = _solved(model, Stage("pull", FREE, gravity=False, fixed=("left",), moves=moves))
+    assert answer.status is Status.CONVERGED, answer.message
+    scale = 0.5 * 100.0 * 0.1 * 2.0 * SIZES[0] * (SIZES[1] + SIZES[2])
+    free, stiff = stretch**2 + 2.0 / stretch - 3.0, stretch**2 + stretch**-2 - 2.0
+    assert free < answer.record[-1].energy_uj / scale < stiff
+
+
+def test_regions_of_two_laws_in_series_share_one_pull() -> None:
+    """A bar of a soft neo-Hookean and a stiffer Mooney–Rivlin half: the border goes where both pulls are equal."""
+    mesh = box_mesh((40.0, 10.0, 10.0), (8, 2, 2))
+    centres = mesh.nodes[mesh.corners].mean(axis=1)
+    x = mesh.nodes[:, 0]
+    soft = Material("neo-hookean", 7.0, 0.0)
+    stiff = Material("mooney-rivlin", 21.0, 0.0, constants=(0.3,))
+    model = Model(
+        TetMesh(mesh.nodes, mesh.tetrahedra, (centres[:, 0] > 20.0).astype(np.int64)),
+        {0: soft, 1: stiff},
+        {0: "soft", 1: "stiff"},
+        {"left": np.flatnonzero(x == 0.0), "right": np.flatnonzero(x == 40.0)},
+    )
+    moves = (Move("right", (6.0, 0.0, 0.0)),)
+    answer = _solved(model, Stage("pull", FREE, gravity=False, fixed=("left",), moves=moves))
+    assert answer.status is Status.CONVERGED
+    border = (20.0 + answer.displacement[answer.mesh.nodes[:, 0] == 20.0, 0]).mean()
+
+    def excess(place: float) -> float:
+        return uniaxial(place / 20.0, soft)[1] - uniaxial((46.0 - place) / 20.0, stiff)[1]
+
+    assert border - 20.0 == pytest.approx(brentq(excess, 20.0, 26.0) - 20.0, rel=0.01)
