@@ -9,7 +9,7 @@ from glisson.core.errors import BadInput
 from glisson.core.model import Material
 from glisson.core.parameters import parameter
 from glisson.framework import settings_file
-from glisson.framework.settings import CapsuleSettings, PlaneSettings, SegmentSettings, Settings
+from glisson.framework.settings import CapsuleSettings, PlaneSettings, RodSettings, SegmentSettings, Settings
 from glisson.framework.settings_file import settings_from_table, settings_text
 from glisson.preoperative.attachments import BoxAttachment, DirectionAttachment
 from glisson.preoperative.lever_placement import LeverLiftParameters
@@ -38,6 +38,7 @@ MANY = replace(
         BoxAttachment((0.0, -10.0, 5.0), (1.0, 2.0, 30.0), "ligament", 4.0),
     ),
     capsule=CapsuleSettings(900.0, 0.2),
+    rod=RodSettings(12.5, friction=0.2),
     scenario=LeverLiftParameters(angle_deg=30.0, gas_pressure_kpa=1.6),
     plane=PlaneSettings(7.5, ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))),
 ).choosing("mesh", "netgen", {"edge_length_mm": 5.0})

@@ -25,6 +25,8 @@ from glisson.core import (
     Move,
     Observation,
     Observations,
+    Rod,
+    RodReport,
     Scenario,
     Stage,
     StageResult,
@@ -87,6 +89,7 @@ def model(quadratic=False) -> Model:
         Structures((Tumour("tumour1", surface),), (tree,), Curve(np.random.default_rng(2).random((5, 3))), 31.7),
         Capsule(900.0, 0.2),
         {"back": 2.5},
+        Rod(12.5, 80.0, 0.2, 0.01),
     )
 
 
@@ -96,7 +99,9 @@ def deformation() -> Deformation:
     contact = ContactReport("lever", (0.1, -2.0, 1 / 3), 12.0, 3.0, 0.01, 0.8, 0.2, 24.9, 0.31)
     away = ContactReport("board", (0.0, 0.0, math.nan), 0.0, math.nan, None, math.nan, 0.0)
     stages = (
-        StageResult("lift", rng.normal(size=mesh.nodes.shape), Status.CONVERGED, (contact, away)),
+        StageResult(
+            "lift", rng.normal(size=mesh.nodes.shape), Status.CONVERGED, (contact, away), RodReport(1.5, 2.0, -0.3)
+        ),
         StageResult("settle & slide <2>", rng.normal(size=mesh.nodes.shape), Status.STAGNATED),
     )
     record = (
@@ -158,7 +163,7 @@ def test_round_trip_of_a_model(tmp_path, quadratic):
 
 
 def test_round_trip_of_a_model_without_structures(tmp_path):
-    plain = dataclasses.replace(model(), structures=Structures())
+    plain = dataclasses.replace(model(), structures=Structures(), rod=None)
     write_model(tmp_path, plain)
     assert same(read_model(tmp_path), plain)
 

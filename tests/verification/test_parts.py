@@ -6,9 +6,24 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from glisson.core import Capsule, ContactLaw, Material, Model, Move, Scenario, Stage, Status
+from glisson.core import (
+    BadInput,
+    Capsule,
+    ContactLaw,
+    Curve,
+    Material,
+    Model,
+    Move,
+    Rod,
+    Scenario,
+    Stage,
+    Status,
+    Structures,
+)
 from glisson.core.mesh import TetMesh
+from glisson.geometry.mapping import PointMap
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
+from glisson.navigation.wire import Wire, carried_wire
 from glisson.verification.bodies import box_mesh, box_model
 from glisson.verification.closed_forms import uniaxial
 
@@ -82,6 +97,56 @@ def test_a_capsule_bears_its_share_of_a_pull() -> None:
     scale = 0.5 * 100.0 * 0.1 * 2.0 * SIZES[0] * (SIZES[1] + SIZES[2])
     free, stiff = stretch**2 + 2.0 / stretch - 3.0, stretch**2 + stretch**-2 - 2.0
     assert free < answer.record[-1].energy_uj / scale < stiff
+
+
+def _with_duct(rod: Rod | None) -> Model:
+    duct = Curve(np.array([[0.0, 10.0, 5.0], [10.0, 12.0, 5.0], [20.0, 9.0, 4.0], [30.0, 10.0, 5.0]]))
+    return _model(structures=Structures(duct=duct, wire_length_mm=25.0), rod=rod)
+
+
+def test_a_wire_of_fixed_length_slides_as_the_duct_shortens() -> None:
+    """Held at the mouth and hardly to be stretched, its tip goes where a curve of that length in the duct ends."""
+    squeeze = Stage("squeeze", FREE, gravity=False, fixed=("left",), moves=(Move("right", (-3.0, 2.0, 0.0)),))
+    answer = _solved(_with_duct(Rod(0.0, axial_stiffness_n=1e3)), squeeze)
+    assert answer.status is Status.CONVERGED, answer.message
+    structures = _with_duct(None).structures
+    point_map = PointMap(answer.mesh, answer.displacement)
+    assert structures.duct is not None
+    tip = carried_wire(structures.duct, 25.0, point_map)[0].points_mm[-1]
+    # Where the tip was in A tells how far it slid past the tissue.
+    arcs, _ = Wire(structures.duct.points_mm, 30.0).project(point_map.back(tip[None]))
+    slide = answer.stages[-1].rod.slide_mm
+    assert slide == pytest.approx(arcs[0] - 25.0, abs=0.1)
+    assert slide > 1.5
+
+
+def test_a_stiff_stent_bends_less_than_the_duct_would() -> None:
+    """The organ with a rod in it gives way less, and in the scan it is in equilibrium with the bent rod."""
+    bend = (Stage("still", FREE, gravity=False, fixed=("left",)), Stage("hang", FREE, fixed=("left",)))
+    loads = {"rest_shape": "from-gravity", "surgery_gravity": DOWN}
+    answers = [_solved(_with_duct(rod), *bend, **loads) for rod in (None, Rod(2.0), Rod(10.0))]
+    free = answers[0].mesh.nodes[:, 0] == SIZES[0]
+    for answer in answers:
+        assert answer.status is Status.CONVERGED, answer.message
+        np.testing.assert_allclose(answer.stages[0].displacement, 0.0, atol=1e-6)
+    sags = [-answer.displacement[free, 2].mean() for answer in answers]
+    assert 0.0 < sags[2] < sags[1] < sags[0]
+    assert answers[0].stages[-1].rod is None
+
+
+def test_friction_keeps_a_wire_from_sliding() -> None:
+    squeeze = Stage("squeeze", FREE, gravity=False, fixed=("left",), moves=(Move("right", (-1.0, 0.0, 0.0)),))
+    slides = [
+        _solved(_with_duct(Rod(0.0, axial_stiffness_n=0.2, grip_n_mm=grip)), squeeze).stages[-1].rod.slide_mm
+        for grip in (0.0, 0.002, 0.02)
+    ]
+    assert slides[0] > slides[1] > slides[2] > 0.0
+    assert slides[2] < 0.5 * slides[0]
+
+
+def test_a_rod_without_a_duct_is_refused() -> None:
+    with pytest.raises(BadInput, match="needs a duct to lie in"):
+        _model(rod=Rod(1.0))
 
 
 def test_regions_of_two_laws_in_series_share_one_pull() -> None:

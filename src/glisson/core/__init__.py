@@ -1,6 +1,6 @@
 """The nouns of Glisson: plain, frozen, validated types that the components exchange."""
 
-from glisson.core.deformation import ContactReport, Deformation, Event, LoadStep, StageResult
+from glisson.core.deformation import ContactReport, Deformation, Event, LoadStep, RodReport, StageResult
 from glisson.core.errors import BadInput, GlissonError, StageFailed
 from glisson.core.guidance import (
     CrossedVessel,
@@ -12,7 +12,7 @@ from glisson.core.guidance import (
 )
 from glisson.core.image import Grid, LabelMap, Volume
 from glisson.core.mesh import TetMesh, TriangleSurface
-from glisson.core.model import Capsule, Material, Model
+from glisson.core.model import Capsule, Material, Model, Rod
 from glisson.core.observations import Observation, Observations
 from glisson.core.scenario import Board, ContactLaw, Lever, LeverDrive, Move, Scenario, Stage
 from glisson.core.status import Status
@@ -44,6 +44,8 @@ __all__ = [
     "Plane",
     "PlaneGuidance",
     "RigidTransform",
+    "Rod",
+    "RodReport",
     "Scenario",
     "Stage",
     "StageFailed",

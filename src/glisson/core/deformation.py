@@ -45,6 +45,19 @@ class ContactReport:
 
 
 @dataclass(frozen=True)
+class RodReport:
+    """The rod in the duct at the end of a stage: how far its tip slid past the tissue since the scan, and its pull.
+
+    `slide_mm` is positive inward, along the duct as it was in the scan; `largest_slide_mm` is that of any of its
+    points, without sign. `tension_n` at the duct's mouth is positive where the rod is drawn.
+    """
+
+    slide_mm: float
+    largest_slide_mm: float
+    tension_n: float
+
+
+@dataclass(frozen=True)
 class Event:
     """Something that happened on the way, for example kind "lost_contact" of a tool at an angle."""
 
@@ -67,6 +80,7 @@ class StageResult:
     displacement: FloatArray
     status: Status
     contacts: tuple[ContactReport, ...] = ()
+    rod: RodReport | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "displacement", frozen_floats(self.displacement, (None, 3), "displacement"))

@@ -69,6 +69,28 @@ class Capsule:
             )
 
 
+@dataclass(frozen=True)
+class Rod:
+    """The wire or stent in the duct as an elastic rod that is held at the duct's mouth and slides inside.
+
+    `friction` is Coulomb's coefficient; `grip_n_mm` is friction per length where the duct hugs the rod.
+    """
+
+    bending_stiffness_n_mm2: float
+    axial_stiffness_n: float = 100.0
+    friction: float = 0.0
+    grip_n_mm: float = 0.0
+
+    def __post_init__(self) -> None:
+        stiff = 0.0 <= self.bending_stiffness_n_mm2 < np.inf and 0.0 < self.axial_stiffness_n < np.inf
+        if not (stiff and 0.0 <= self.friction < 10.0 and 0.0 <= self.grip_n_mm < np.inf):
+            raise BadInput(
+                "A rod needs a bending stiffness of at least 0, a positive axial stiffness, a friction of 0 to 10 and "
+                f"a grip of at least 0, not {self.bending_stiffness_n_mm2} N·mm², {self.axial_stiffness_n} N, "
+                f"{self.friction} and {self.grip_n_mm} N/mm."
+            )
+
+
 @dataclass(frozen=True, eq=False)
 class Model:
     """What the scan says of the organ, in its scanned shape A.
@@ -76,6 +98,7 @@ class Model:
     `materials` maps region numbers of the mesh to materials, `region_names` to names for people,
     `node_sets` names to node numbers (attachments such as "back"). `ligaments` maps node sets to the stiffness in
     kPa/mm with which they are drawn back to where they are in A; node sets that are held fast belong to the stages.
+    `rod` gives the wire in the duct a stiffness of its own.
     """
 
     mesh: TetMesh
@@ -85,6 +108,7 @@ class Model:
     structures: Structures = field(default_factory=Structures)
     capsule: Capsule | None = None
     ligaments: Mapping[str, float] = field(default_factory=dict)
+    rod: Rod | None = None
 
     def __post_init__(self) -> None:
         present = {int(n) for n in np.unique(self.mesh.region_numbers)}
@@ -103,6 +127,8 @@ class Model:
             if not 0.0 < stiffness < np.inf:
                 raise BadInput(f"Ligament {name!r} needs a positive stiffness, not {stiffness} kPa/mm.")
         object.__setattr__(self, "ligaments", MappingProxyType(dict(self.ligaments)))
+        if self.rod is not None and self.structures.duct is None:
+            raise BadInput("A rod needs a duct to lie in; label the duct or the wire.")
 
     def node_set(self, name: str) -> IntArray:
         """Node numbers of a named set.

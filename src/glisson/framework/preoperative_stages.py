@@ -79,6 +79,7 @@ class MeshStage(Stage):
             "materials": materials,
             "attachments": attachments,
             "capsule": asdict(settings.capsule),
+            "rod": asdict(settings.rod),
         }
 
     def techniques(self, settings: Settings) -> Sequence[tuple[str, str]]:
@@ -101,7 +102,9 @@ class MeshStage(Stage):
         if before is not None and before.facts.get("tetrahedra_from") == made_from and case.has(MODEL):
             mesher = _KeptTetrahedra(read_model(case.path(MODEL)).mesh)
         extractor = settings.choices["surface"].make(SETTINGS, settings.seed)
-        model_settings = ModelSettings(settings.materials, settings.attachments, settings.capsule.made())
+        model_settings = ModelSettings(
+            settings.materials, settings.attachments, settings.capsule.made(), settings.rod.made()
+        )
         model, report = build_model(organ, tumours, structures, extractor, mesher, model_settings, progress)
         write_model(out / MODEL, model)
         return _mesh_facts(report) | {"tetrahedra_from": made_from}

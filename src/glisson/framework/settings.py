@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Any
 
 from glisson.core.errors import BadInput
-from glisson.core.model import Capsule, Material
+from glisson.core.model import Capsule, Material, Rod
 from glisson.core.parameters import build_parameters, parameter
 from glisson.core.registry import technique_class
 from glisson.preoperative.attachments import DEFAULT_ATTACHMENTS, Attachment
@@ -101,10 +101,29 @@ class CapsuleSettings:
         return None if self.young_modulus_kpa is None else Capsule(self.young_modulus_kpa, self.thickness_mm)
 
 
+@dataclass(frozen=True)
+class RodSettings:
+    """The wire or stent in the duct as a body with a stiffness of its own."""
+
+    bending_stiffness_n_mm2: float | None = parameter(
+        None, "Bending stiffness E I of the wire or stent (N·mm²); none: it follows the duct without resistance.", 0.0
+    )
+    axial_stiffness_n: float = parameter(100.0, "Axial stiffness E A (N).", 1e-6, 1e9)
+    friction: float = parameter(0.0, "Coefficient of friction between rod and duct.", 0.0, 9.0)
+    grip_n_mm: float = parameter(0.0, "Friction per length of a duct that hugs the rod (N/mm).", 0.0, 1e3)
+
+    def made(self) -> Rod | None:
+        """The rod; None where there is none."""
+        if self.bending_stiffness_n_mm2 is None:
+            return None
+        return Rod(self.bending_stiffness_n_mm2, self.axial_stiffness_n, self.friction, self.grip_n_mm)
+
+
 SECTIONS: Mapping[str, type[Any]] = MappingProxyType(
     {
         "segment": SegmentSettings,
         "capsule": CapsuleSettings,
+        "rod": RodSettings,
         "plane": PlaneSettings,
         "scenario": LeverLiftParameters,
     }
@@ -131,6 +150,7 @@ class Settings:
     attachments: tuple[Attachment, ...] = DEFAULT_ATTACHMENTS
     segment: SegmentSettings = field(default_factory=SegmentSettings)
     capsule: CapsuleSettings = field(default_factory=CapsuleSettings)
+    rod: RodSettings = field(default_factory=RodSettings)
     plane: PlaneSettings = field(default_factory=PlaneSettings)
     scenario: LeverLiftParameters = field(default_factory=LeverLiftParameters)
     target: str | None = None

@@ -38,6 +38,7 @@ _ABOUT = {
     "mesh": "The tetrahedra inside the surface.",
     "simulate": "The solver of the manoeuvre that scenario.toml describes.",
     "capsule": "Glisson's capsule around the organ; materials of the regions inside it are further down.",
+    "rod": "The wire or stent in the duct as an elastic rod, held at the duct's mouth.",
     "plane": "The resection plane; the side of the target is removed.",
     "scenario": "The manoeuvre that is proposed where nobody wrote or changed scenario.toml.",
 }

@@ -12,6 +12,7 @@ from glisson.core import (
     Deformation,
     Event,
     LoadStep,
+    RodReport,
     StageResult,
     Status,
 )
@@ -43,6 +44,7 @@ def write_deformation(folder: str | Path, deformation: Deformation) -> None:
                 "field": field,
                 "status": stage.status.value,
                 "contacts": [vars(contact) for contact in stage.contacts],
+                "rod": vars(stage.rod) if stage.rod else None,
             }
             for stage, field in zip(deformation.stages, fields, strict=True)
         ],
@@ -83,7 +85,8 @@ def _stage(record: Record, cells: VtkCells) -> StageResult:
         if field not in cells.point_data:
             raise BadInput(f"the field {field!r} is not in the mesh file.")
         contacts = tuple(_contact(entry) for entry in record.records("contacts"))
-        return StageResult(record.text("name"), cells.point_data[field], _status(record), contacts)
+        rod = _rod(record.record("rod")) if record.has("rod") else None
+        return StageResult(record.text("name"), cells.point_data[field], _status(record), contacts, rod)
 
 
 def _contact(record: Record) -> ContactReport:
@@ -99,6 +102,12 @@ def _contact(record: Record) -> ContactReport:
             angle_deg=record.number_or_none("angle_deg"),
             hinge_moment_nm=record.number_or_none("hinge_moment_nm"),
         )
+
+
+def _rod(record: Record) -> RodReport:
+    with record.building():
+        names = ("slide_mm", "largest_slide_mm", "tension_n")
+        return RodReport(*(record.number_or_nan(name) for name in names))
 
 
 def _step(record: Record) -> LoadStep:

@@ -4,7 +4,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from glisson.core import BadInput, Capsule, Curve, Material, Model, Structures, TriangleSurface, Tumour, VesselTree
+from glisson.core import BadInput, Capsule, Curve, Material, Model, Rod, Structures, TriangleSurface, Tumour, VesselTree
 from glisson.io.mesh_pairs import read_pair, write_pair
 from glisson.io.records import Record
 
@@ -31,6 +31,8 @@ def write_model(folder: str | Path, model: Model) -> None:
     }
     if model.capsule is not None:
         values["capsule"] = asdict(model.capsule)
+    if model.rod is not None:
+        values["rod"] = asdict(model.rod)
     write_pair(Path(folder), _NAME, model.mesh, {}, values)
 
 
@@ -50,6 +52,7 @@ def read_model(folder: str | Path) -> Model:
             node_sets={key: sets.wholes(key, -1) for key in sets.keys()},  # noqa: SIM118
             structures=_structures(record.record("structures")),
             capsule=_capsule(record.record("capsule")) if record.has("capsule") else None,
+            rod=_rod(record.record("rod")) if record.has("rod") else None,
             ligaments=_ligaments(record.record("ligaments")) if record.has("ligaments") else {},
         )
 
@@ -84,6 +87,12 @@ def _material(record: Record) -> Material:
 def _capsule(record: Record) -> Capsule:
     with record.building():
         return Capsule(record.number("young_modulus_kpa"), record.number("thickness_mm"))
+
+
+def _rod(record: Record) -> Rod:
+    with record.building():
+        names = ("bending_stiffness_n_mm2", "axial_stiffness_n", "friction", "grip_n_mm")
+        return Rod(*(record.number(name) for name in names))
 
 
 def _ligaments(record: Record) -> dict[str, float]:

@@ -175,6 +175,8 @@ class Body:
         if update_friction:
             for contact, touch in zip(self.contacts, touches, strict=True):
                 contact.update_friction(touch, self.law)
+            for part in self.parts:
+                part.renew(positions)
         return touches
 
     def renew_cohesion(self, positions: FloatArray) -> int:

@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.model import Model
 from glisson.mechanics.faces import exact_rule, face_nodes, face_values
+from glisson.mechanics.parts import Memoryless
 
 
-class ElasticAttachments:
+class ElasticAttachments(Memoryless):
     """A `Part`: faces whose corners all belong to a node set are drawn back to where they are in A.
 
     What they bear in A, where the organ hangs on them, they go on bearing; see `settle`.
@@ -57,15 +58,6 @@ class ElasticAttachments:
         """The springs, always definite."""
         local: FloatArray = self._springs[..., None, None] * np.eye(3)
         return self._faces, local
-
-    def accept(self, positions: FloatArray) -> None:
-        """Springs remember nothing."""
-
-    def memory(self) -> None:
-        """Nothing."""
-
-    def recall(self, memory: None) -> None:
-        """Nothing is put back."""
 
     def _away(self, positions: FloatArray) -> FloatArray:
         away: FloatArray = positions[self._faces] - self._scanned[self._faces]

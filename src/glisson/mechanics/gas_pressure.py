@@ -7,13 +7,14 @@ import numpy as np
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.mesh import TetMesh
 from glisson.mechanics.faces import exact_rule, face_nodes, face_slopes, face_values
+from glisson.mechanics.parts import Memoryless
 
 _ORDERS = tuple(permutations(range(3)))
 _SIGNS = (1.0, -1.0, -1.0, 1.0, 1.0, -1.0)
 """Even and odd orders of three things."""
 
 
-class GasPressure:
+class GasPressure(Memoryless):
     """A `Part` with the potential p V: the surface is closed, so that the force has one, and a symmetric derivative.
 
     V = Σ A_abc x_a · (x_b × x_c) over the nodes a, b, c of each face, with constants A that change their sign
@@ -56,15 +57,6 @@ class GasPressure:
         for (i, j, k), sign in zip(_ORDERS, _SIGNS, strict=True):
             local[..., i, j] += sign * arms[..., k]
         return self._faces, local
-
-    def accept(self, positions: FloatArray) -> None:
-        """A gas remembers nothing."""
-
-    def memory(self) -> None:
-        """Nothing."""
-
-    def recall(self, memory: None) -> None:
-        """Nothing is put back."""
 
     def _slopes(self, places: FloatArray) -> FloatArray:
         """∂V/∂x_a of each face's nodes (f, a, 3)."""

@@ -11,9 +11,10 @@ from glisson.core.mesh import TetMesh
 from glisson.core.model import Capsule
 from glisson.mechanics.elements import triangle_rule
 from glisson.mechanics.faces import face_nodes, face_slopes
+from glisson.mechanics.parts import Memoryless
 
 
-class Membrane:
+class Membrane(Memoryless):
     """A `Part`, free of stress in A."""
 
     def __init__(self, mesh: TetMesh, capsule: Capsule) -> None:
@@ -57,15 +58,6 @@ class Membrane:
         half = np.einsum("fqidke,fqbe->fqidkb", tangent, self._gradients)
         local = np.einsum("fq,fqad,fqidkb->fabik", self._weights, self._gradients, half)
         return self._faces, local
-
-    def accept(self, positions: FloatArray) -> None:
-        """It is elastic and remembers nothing."""
-
-    def memory(self) -> None:
-        """Nothing."""
-
-    def recall(self, memory: None) -> None:
-        """Nothing is put back."""
 
     def _deformation(self, positions: FloatArray) -> FloatArray:
         """F (f, q, 3, 2): the flat frame's axes, carried along."""

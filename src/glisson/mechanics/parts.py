@@ -20,6 +20,9 @@ class Part(Protocol):
         `project` makes it positive semi-definite. Groups may change from call to call.
         """
 
+    def renew(self, positions: FloatArray) -> None:
+        """Let friction's limits follow the present pressure."""
+
     def accept(self, positions: FloatArray) -> None:
         """Remember what a converged load step leaves behind, as friction's slip."""
 
@@ -28,3 +31,19 @@ class Part(Protocol):
 
     def recall(self, memory: Any) -> None:
         """Put back what `memory` returned."""
+
+
+class Memoryless:
+    """What parts share that are elastic: they remember nothing."""
+
+    def renew(self, positions: FloatArray) -> None:
+        """Nothing rubs."""
+
+    def accept(self, positions: FloatArray) -> None:
+        """Nothing is left behind."""
+
+    def memory(self) -> None:
+        """Nothing."""
+
+    def recall(self, memory: None) -> None:
+        """Nothing is put back."""

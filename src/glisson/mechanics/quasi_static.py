@@ -26,6 +26,7 @@ from glisson.mechanics.newton import Newton, NewtonSettings
 from glisson.mechanics.numbering import numbering
 from glisson.mechanics.rest_shape import RestShape, find_rest_shape
 from glisson.mechanics.sampling import face_parts
+from glisson.mechanics.sliding_rod import SlidingRod
 from glisson.mechanics.stages import StageRunner, fixed_unknowns, gravity_forces
 from glisson.mechanics.tools import make_tool
 
@@ -97,7 +98,8 @@ class QuasiStatic:
         mesh = model.mesh
         tools = [make_tool(tool) for tool in scenario.tools]
         surface = surface_quadrature(mesh.nodes, mesh, face_parts(mesh, tools))
-        rest = self._rest_shape(model, scenario, surface)
+        rod = _rod(model)
+        rest = self._rest_shape(model, scenario, surface, rod)
         stiffest = max(material.young_modulus_kpa for material in model.materials.values())
         slope = max(_CUSHION_STIFFNESS_KPA, _CUSHION_STIFFNESS_MODULI * stiffest) / parameters.contact_range_mm
         cushion = Cushion(parameters.contact_range_mm, slope)
@@ -110,26 +112,39 @@ class QuasiStatic:
         ligaments = ElasticAttachments(model, model.ligaments)
         gas = GasPressure(mesh) if any(stage.gas_pressure_kpa for stage in scenario.stages) else None
         capsule = () if model.capsule is None else (Membrane(mesh, model.capsule),)
-        parts = (*capsule, *((ligaments,) if model.ligaments else ()))
+        parts = (*capsule, *((ligaments,) if model.ligaments else ()), *(() if rod is None else (rod,)))
         body = Body(elasticity, surface, contacts, fixed, parts, gas)
         if scenario.rest_shape == "from-gravity":
             body.external = gravity_forces(model, scenario.scan_gravity)
             ligaments.settle(body.balance(mesh.nodes, body.touches(mesh.nodes)).unbalanced)
         return body
 
-    def _rest_shape(self, model: Model, scenario: Scenario, surface: SurfaceQuadrature) -> RestShape:
-        if scenario.rest_shape == "as-scanned" or scenario.scan_gravity is None:
+    def _rest_shape(
+        self, model: Model, scenario: Scenario, surface: SurfaceQuadrature, rod: SlidingRod | None
+    ) -> RestShape:
+        if scenario.rest_shape == "as-scanned" or (scenario.scan_gravity is None and rod is None):
             return RestShape(model.mesh.nodes, {})
+        loads = gravity_forces(model, scenario.scan_gravity)
+        if rod is not None:
+            loads += rod.forces(model.mesh.nodes)
         supports = [t for t in scenario.tools if isinstance(t, Board) and t.name in scenario.scan_supports]
         return find_rest_shape(
             model.mesh,
             model.materials,
-            gravity_forces(model, scenario.scan_gravity),
+            loads,
             supports,
             surface,
             fixed_unknowns(model, (*scenario.stages[0].fixed, *model.ligaments)),
             self._parameters.surface_tolerance_mm,
         )
+
+
+def _rod(model: Model) -> SlidingRod | None:
+    """The rod in the model's duct; None where there is none."""
+    structures = model.structures
+    if model.rod is None or structures.duct is None or structures.wire_length_mm is None:
+        return None
+    return SlidingRod(model.mesh, structures.duct, structures.wire_length_mm, model.rod)
 
 
 def _quadratic(model: Model) -> Model:

@@ -19,6 +19,7 @@ from glisson.mechanics.contact import ToolContact
 from glisson.mechanics.contact_report import hinge_moment, report_contacts
 from glisson.mechanics.elements import lumped_volumes, nodal_volumes
 from glisson.mechanics.newton import Newton, NewtonEnd
+from glisson.mechanics.sliding_rod import SlidingRod
 from glisson.mechanics.tools import LeverTool
 
 _SMALLEST_SHARE = 1.0 / 256.0  # of a stage: smaller load steps are not tried
@@ -63,7 +64,9 @@ class StageRunner:
             if end.status is Status.CONVERGED:
                 end = self._without_penetration(stage)
             contacts = report_contacts(self._body, self._positions)
-            results.append(StageResult(stage.name, self._displacement(), end.status, contacts))
+            rods = [part.report(self._positions) for part in self._body.parts if isinstance(part, SlidingRod)]
+            rod = rods[0] if rods else None
+            results.append(StageResult(stage.name, self._displacement(), end.status, contacts, rod))
             if end.status is not Status.CONVERGED:
                 return self._deformation(results, end.status, _sentence(stage, end))
         missed = self._never_touched()

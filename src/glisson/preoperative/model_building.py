@@ -11,7 +11,7 @@ from scipy import ndimage
 from glisson.core.errors import BadInput, StageFailed
 from glisson.core.image import LabelMap
 from glisson.core.mesh import TetMesh
-from glisson.core.model import Capsule, Material, Model
+from glisson.core.model import Capsule, Material, Model, Rod
 from glisson.core.protocols import Mesher, Progress, SurfaceExtractor, silent
 from glisson.core.status import Status
 from glisson.preoperative.attachments import DEFAULT_ATTACHMENTS, Attachment, ligaments, node_sets
@@ -49,6 +49,7 @@ class ModelSettings:
     materials: Mapping[str, Material] = field(default_factory=lambda: {ORGAN: HUMAN_LIVER})
     attachments: tuple[Attachment, ...] = DEFAULT_ATTACHMENTS
     capsule: Capsule | None = None
+    rod: Rod | None = None
 
     def __post_init__(self) -> None:
         if ORGAN not in self.materials:
@@ -123,6 +124,7 @@ def build_model(
         node_sets=node_sets(mesh, settings.attachments),
         structures=build_structures(LabelMap(whole.astype(np.uint8), organ.grid, {1: ORGAN}), tumours, structures),
         capsule=settings.capsule,
+        rod=settings.rod,
         ligaments=ligaments(settings.attachments),
     )
     notes = [f"A separate crumb of the mask was left out: {crumb.place}." for crumb in crumbs[:5]]

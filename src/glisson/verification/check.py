@@ -10,8 +10,8 @@ import numpy as np
 from glisson.core.errors import GlissonError
 
 PREFIXES = (
-    "patch", "mms", "closed-form", "cook", "elastica", "hertz", "friction", "capstan", "parts", "rigid", "energy",
-    "taylor", "mestdagh", "calculix",
+    "patch", "mms", "closed-form", "cook", "elastica", "hertz", "friction", "capstan", "rod", "parts", "rigid",
+    "energy", "taylor", "mestdagh", "calculix",
 )  # fmt: skip
 """How names of cases and checks may begin, in the order in which they run."""
 

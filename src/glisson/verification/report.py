@@ -21,6 +21,7 @@ TITLES = {
     "hertz": "Hertz contact",
     "friction": "Friction and cohesion",
     "capstan": "Belt friction",
+    "rod": "Rod in a duct",
     "parts": "Capsule, gas and ligaments",
     "rigid": "Rigid rotation",
     "energy": "Energy balance",

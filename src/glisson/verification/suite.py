@@ -20,6 +20,7 @@ from glisson.verification import (
     parts,
     patch,
     rigid,
+    rod,
     taylor,
     torsion,
 )
@@ -27,7 +28,7 @@ from glisson.verification.check import PREFIXES, Case, Check
 
 _FAMILIES = (
     *(patch, manufactured, closed_forms, torsion, inflation, cook, elastica, hertz, friction, capstan),
-    *(parts, rigid, energy, taylor, mestdagh, calculix),
+    *(rod, parts, rigid, energy, taylor, mestdagh, calculix),
 )
 CASES: tuple[Case, ...] = tuple(
     sorted((case for family in _FAMILIES for case in family.CASES), key=lambda case: PREFIXES.index(case.prefix))

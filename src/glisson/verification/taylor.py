@@ -8,8 +8,9 @@ import numpy as np
 
 from glisson.core.arrays import FloatArray
 from glisson.core.mesh import TetMesh
-from glisson.core.model import Capsule, Material
+from glisson.core.model import Capsule, Material, Rod
 from glisson.core.scenario import ContactLaw, Lever
+from glisson.core.structures import Curve
 from glisson.mechanics.body import Body
 from glisson.mechanics.contact import Touch
 from glisson.mechanics.contact_law import Cushion, shear_share, shear_slope, slip_energy
@@ -20,6 +21,7 @@ from glisson.mechanics.materials.law import find_law
 from glisson.mechanics.membrane import Membrane
 from glisson.mechanics.parts import Part
 from glisson.mechanics.pattern import block_pattern
+from glisson.mechanics.sliding_rod import SlidingRod
 from glisson.mechanics.tools import LeverTool, RigidTool, make_tool
 from glisson.verification.bodies import FRAME_INDIFFERENT, LAWS, body_of, box_mesh, distorted, floor, material_of
 from glisson.verification.check import Case, Check, NoSolution, taylor_check, vanishing
@@ -112,6 +114,15 @@ def _gas(mesh: TetMesh) -> GasPressure:
     gas = GasPressure(mesh)
     gas.pressure_kpa = 2.0
     return gas
+
+
+def _rod(mesh: TetMesh) -> SlidingRod:
+    """A rod that has slid, at limits of friction as they were before."""
+    duct = Curve(np.array([[2.0, 9.0, 5.0], [10.0, 11.0, 4.0], [18.0, 9.0, 6.0], [28.0, 10.0, 5.0]]))
+    rod = SlidingRod(mesh, duct, 24.0, Rod(0.05, axial_stiffness_n=2.0, friction=0.3, grip_n_mm=1e-3))
+    rod.drawn_mm = 1.0
+    rod.renew(mesh.nodes)
+    return rod
 
 
 def _times(body: Body, blocks: FloatArray, direction: FloatArray) -> FloatArray:
@@ -225,6 +236,7 @@ _CONTACTS = {
 _PARTS: dict[str, Callable[[TetMesh], Part]] = {
     "capsule": lambda mesh: Membrane(mesh, Capsule(young_modulus_kpa=300.0, thickness_mm=0.2)),
     "gas": _gas,
+    "rod": _rod,
 }
 
 CASES = (
