@@ -21,7 +21,7 @@ import numpy as np
 
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.mesh import TetMesh
-from glisson.core.scenario import Board, Lever
+from glisson.core.tools import Board, Lever
 from glisson.core.units import STANDARD_GRAVITY_MM_S2, density_from_kg_m3, radians
 from glisson.phantom.calculix.lift_deck import LiftOrgan, LiftSettings, LiftSteps, with_middles, write_lift_deck
 from glisson.phantom.calculix.results import read_frd, run_calculix

@@ -15,12 +15,14 @@ from glisson.core import (
     ContactLaw,
     ContactReport,
     Curve,
+    Cylinder,
     Deformation,
     Event,
     Lever,
     LeverDrive,
     LoadStep,
     Material,
+    MeshTool,
     Model,
     Move,
     Observation,
@@ -28,10 +30,13 @@ from glisson.core import (
     Rod,
     RodReport,
     Scenario,
+    Slot,
     Stage,
     StageResult,
     Status,
     Structures,
+    ToolMotion,
+    TriangleSurface,
     Tumour,
     VesselTree,
 )
@@ -61,6 +66,11 @@ def same(one, other):
 def scenario() -> Scenario:
     board = Board("board", [1.0, 95.3, -3.0], [0.0, -1.0, 0.0])
     bedding = Board("bedding", [0.0, 101.0, 0.0], [0.0, -1.0, 0.1], conforming=True)
+    slotted = Board(
+        "slotted", [0.0, 102.0, 0.0], [0.0, -1.0, 0.0], slot=Slot([1.0, 102.0, 3.0], [0.6, 0.0, 0.8], 90.0, 30.0)
+    )
+    jaw = Cylinder("jaw", [0.0, 50.0, 0.0], [10.0, 50.0, 1.0], 2.5)
+    pad = MeshTool("pad", block((1, 1, 1), (5.0, 5.0, 5.0)).surface(), 0.75)
     lever = Lever.lifting(
         "lever", np.array([5.0, 80.0, 7.0]), np.array([1.0, 0, 0.2]), np.array([0, -1.0, 0]), length_mm=120.0
     )
@@ -72,8 +82,14 @@ def scenario() -> Scenario:
         fixed=("back", "cut"),
         moves=(Move("tip", (1.5, 0.0, -2.0)),),
         gas_pressure_kpa=1.6,
+        motions=(
+            ToolMotion("jaw", (1.0, 2.0, -3.5)),
+            ToolMotion("pad", turn_deg=(0.0, 12.0, 0.0), about_mm=(1.0, 2.0, 3.0)),
+        ),
     )
-    return Scenario((board, bedding, lever), (lift, settle), [0, 1, 0], None, ("board",), "as-scanned")
+    return Scenario(
+        (board, bedding, slotted, lever, jaw, pad), (lift, settle), [0, 1, 0], None, ("board",), "as-scanned"
+    )
 
 
 def model(quadratic=False) -> Model:
@@ -125,7 +141,9 @@ def test_round_trip_of_a_scenario(tmp_path):
     for one, other in zip(scenario().tools, back.tools, strict=True):
         for item in dataclasses.fields(one):
             value = getattr(one, item.name)
-            if isinstance(value, np.ndarray):
+            if isinstance(value, Slot | TriangleSurface):
+                assert same(value, getattr(other, item.name))
+            elif isinstance(value, np.ndarray):
                 assert np.allclose(value, getattr(other, item.name), rtol=0, atol=1e-15 * 200)
             else:
                 assert value == getattr(other, item.name)
@@ -139,9 +157,10 @@ def test_the_keys_of_a_scenario_are_the_agreed_ones(tmp_path):
     write_scenario(tmp_path / "scenario.toml", scenario())
     table = tomllib.loads((tmp_path / "scenario.toml").read_text())
     assert table["schema"] == 1
-    assert set(table) == {"schema", "rest_shape", "scan_gravity", "scan_supports", "boards", "levers", "stages"}
+    tools = {"boards", "levers", "cylinders", "mesh_tools"}
+    assert set(table) == {"schema", "rest_shape", "scan_gravity", "scan_supports", "stages"} | tools
     expected = {"name", "friction", "cohesion_kpa", "gravity", "fixed", "drives", "moves", "gas_pressure_kpa"}
-    assert set(table["stages"][0]) == expected
+    assert set(table["stages"][0]) == expected | {"motions"}
     assert table["stages"][1]["drives"] == [{"lever": "lever", "force_n": 2.5}]
 
 

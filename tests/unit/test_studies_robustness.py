@@ -10,8 +10,9 @@ from glisson.cli import study as command
 from glisson.core.deformation import Deformation, Event, StageResult
 from glisson.core.mesh import TetMesh
 from glisson.core.model import Model
-from glisson.core.scenario import Lever, Scenario
+from glisson.core.scenario import Scenario
 from glisson.core.status import Status
+from glisson.core.tools import Lever
 from glisson.phantom.proportions import draw_proportions
 from glisson.phantom.truth_checks import inverted_elements
 from glisson.studies.lift_robustness import tasks

@@ -5,7 +5,7 @@ import pytest
 
 from glisson.core import ContactLaw, Lever, Status
 from glisson.mechanics.contact_law import Cushion
-from glisson.mechanics.tools import LeverTool
+from glisson.mechanics.lever_tool import LeverTool
 from glisson.verification.friction import incline
 
 WEIGHT_N = 1150e-9 * 40 * 30 * 10 * 9806.65 * 1e-3  # 0.1353 N, of the block of `incline`

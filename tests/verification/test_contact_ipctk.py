@@ -19,7 +19,7 @@ from triangles import lever_surface, organ_surface
 from glisson.core import Lever, LeverDrive, Status
 from glisson.core.deformation import ContactReport
 from glisson.core.mesh import TriangleSurface
-from glisson.mechanics.tools import LeverTool
+from glisson.mechanics.lever_tool import LeverTool
 
 ipctk.set_num_threads(1)
 

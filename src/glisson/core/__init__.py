@@ -14,9 +14,10 @@ from glisson.core.image import Grid, LabelMap, Volume
 from glisson.core.mesh import TetMesh, TriangleSurface
 from glisson.core.model import Capsule, Material, Model, Rod
 from glisson.core.observations import Observation, Observations
-from glisson.core.scenario import Board, ContactLaw, Lever, LeverDrive, Move, Scenario, Stage
+from glisson.core.scenario import ContactLaw, LeverDrive, Move, Scenario, Stage, ToolMotion
 from glisson.core.status import Status
 from glisson.core.structures import Curve, Plane, Structures, Tumour, VesselTree
+from glisson.core.tools import Board, Cylinder, Lever, MeshTool, Slot
 from glisson.core.transform import RigidTransform
 
 __all__ = [
@@ -27,6 +28,7 @@ __all__ = [
     "ContactReport",
     "CrossedVessel",
     "Curve",
+    "Cylinder",
     "Deformation",
     "Event",
     "GlissonError",
@@ -37,6 +39,7 @@ __all__ = [
     "LeverDrive",
     "LoadStep",
     "Material",
+    "MeshTool",
     "Model",
     "Move",
     "Observation",
@@ -47,12 +50,14 @@ __all__ = [
     "Rod",
     "RodReport",
     "Scenario",
+    "Slot",
     "Stage",
     "StageFailed",
     "StageResult",
     "Status",
     "Structures",
     "TetMesh",
+    "ToolMotion",
     "TriangleSurface",
     "Tumour",
     "TumourGuidance",

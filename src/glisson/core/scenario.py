@@ -4,73 +4,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from glisson.core.arrays import FloatArray, frozen_floats, unit_vector
+from glisson.core.arrays import FloatArray, unit_vector
 from glisson.core.errors import BadInput
-
-
-@dataclass(frozen=True, eq=False)
-class Board:
-    """A plane that the organ lies on; `normal` points from the board towards the organ.
-
-    A `conforming` board is bedding or neighbouring tissue that has taken the shape of the organ's
-    underside in the scan: it carries every downward-facing part of the surface where the scan shows it,
-    and yields to sharp edges by a fraction of a millimetre.
-    """
-
-    name: str
-    point_mm: FloatArray
-    normal: FloatArray
-    conforming: bool = False
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "point_mm", frozen_floats(self.point_mm, (3,), "board point"))
-        object.__setattr__(self, "normal", unit_vector(self.normal, "board normal"))
-
-
-@dataclass(frozen=True, eq=False)
-class Lever:
-    """A rigid bar with rounded edges on a hinge: the wooden lever of the dissertation's chapter 4.
-
-    At angle 0 the bar starts at `hinge_mm` and runs `length_mm` along `arm`; it is `width_mm` wide along
-    `axis` (centred on the hinge) and its top face contains the hinge, the bar lying `thickness_mm` below
-    it. A positive angle turns the bar about `axis` by the right-hand rule, which moves the tip towards
-    `up` = axis × arm; `Lever.lifting` chooses the axis from the direction that is up.
-    """
-
-    name: str
-    hinge_mm: FloatArray
-    axis: FloatArray
-    arm: FloatArray
-    length_mm: float = 150.0
-    width_mm: float = 25.0
-    thickness_mm: float = 8.0
-    edge_radius_mm: float = 3.0
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "hinge_mm", frozen_floats(self.hinge_mm, (3,), "lever hinge"))
-        object.__setattr__(self, "axis", unit_vector(self.axis, "lever axis"))
-        object.__setattr__(self, "arm", unit_vector(self.arm, "lever arm"))
-        if abs(float(self.axis @ self.arm)) > 1e-6:
-            raise BadInput("The lever's axis and arm must be perpendicular.")
-        sizes = (self.length_mm, self.width_mm, self.thickness_mm)
-        if min(sizes) <= 0.0 or not 0.0 < self.edge_radius_mm <= min(sizes) / 2.0:
-            raise BadInput(
-                f"Lever {self.name!r} needs positive sizes and an edge radius of at most half its "
-                f"smallest one, not {sizes} mm and {self.edge_radius_mm} mm."
-            )
-
-    @property
-    def up(self) -> FloatArray:
-        """Unit normal of the top face at angle 0, the side that touches the organ: axis × arm."""
-        return np.cross(self.axis, self.arm)
-
-    @classmethod
-    def lifting(cls, name: str, hinge_mm: FloatArray, arm: FloatArray, up: FloatArray, **sizes: float) -> "Lever":
-        """A lever whose positive angle moves its tip from `arm` towards `up`."""
-        direction = unit_vector(arm, "lever arm")
-        upward = np.asarray(up, dtype=np.float64)
-        return cls(name, hinge_mm, np.cross(direction, upward), direction, **sizes)
+from glisson.core.tools import Board, Cylinder, Lever, MeshTool, Tool
+from glisson.core.transform import RigidTransform
 
 
 @dataclass(frozen=True)
@@ -122,12 +61,38 @@ class Move:
 
 
 @dataclass(frozen=True)
+class ToolMotion:
+    """How a stage carries a cylinder or a mesh tool: by `displacement_mm` (LPS), turning evenly as it goes.
+
+    `turn_deg` is a rotation vector in degrees, about the point `about_mm` that goes along; it needs that point.
+    """
+
+    tool: str
+    displacement_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    turn_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    about_mm: tuple[float, float, float] | None = None
+
+    def __post_init__(self) -> None:
+        vectors = (self.displacement_mm, self.turn_deg, self.about_mm or (0.0, 0.0, 0.0))
+        if not all(len(vector) == 3 and np.isfinite(vector).all() for vector in vectors):
+            raise BadInput(f"A motion of tool {self.tool!r} needs three finite numbers for each vector.")
+        if any(self.turn_deg) and self.about_mm is None:
+            raise BadInput(f"A turn of tool {self.tool!r} needs about_mm, the point about which it turns.")
+
+    def pose(self, share: float) -> RigidTransform:
+        """Where a share of the motion takes points of the patient's frame."""
+        about = np.zeros(3) if self.about_mm is None else np.array(self.about_mm)
+        turn = Rotation.from_rotvec(share * np.radians(self.turn_deg)).as_matrix()
+        return RigidTransform("patient", "patient", turn, about - turn @ about + share * np.array(self.displacement_mm))
+
+
+@dataclass(frozen=True)
 class Stage:
     """One stage: its own gravity, contact law, fixed node sets, tool motion, carried node sets and gas pressure.
 
-    `drives` names the levers that move; the others hold the angle that they had. What `moves` carries is let go
-    at the stage's end, unless the next stage names it among `fixed` or `moves`. The gas of a pneumoperitoneum presses
-    on the whole surface (12 mmHg are 1.6 kPa).
+    `drives` names the levers that move, `motions` the cylinders and mesh tools; others stay where they are. What
+    `moves` carries is let go at the stage's end, unless the next stage names it among `fixed` or `moves`. The gas of a
+    pneumoperitoneum presses on the whole surface (12 mmHg are 1.6 kPa).
     """
 
     name: str
@@ -137,6 +102,7 @@ class Stage:
     fixed: tuple[str, ...] = ("back",)
     moves: tuple[Move, ...] = ()
     gas_pressure_kpa: float = 0.0
+    motions: tuple[ToolMotion, ...] = ()
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.gas_pressure_kpa <= 20.0:
@@ -155,7 +121,7 @@ class Scenario:
     `rest_shape` "from-gravity" finds the unloaded shape; "as-scanned" takes A as free of stress.
     """
 
-    tools: tuple[Board | Lever, ...]
+    tools: tuple[Tool, ...]
     stages: tuple[Stage, ...]
     scan_gravity: FloatArray | None = None
     surgery_gravity: FloatArray | None = None
@@ -183,8 +149,28 @@ class Scenario:
                     raise BadInput(
                         f"Stage {stage.name!r} drives {drive.lever!r}, which is not a lever of the scenario."
                     )
+        carried = {tool.name for tool in self.tools if isinstance(tool, Cylinder | MeshTool)}
+        for stage in self.stages:
+            moved = [motion.tool for motion in stage.motions]
+            for name in moved:
+                if name not in carried:
+                    raise BadInput(f"Stage {stage.name!r} moves {name!r}, which is no cylinder or mesh tool.")
+            if len(set(moved)) != len(moved):
+                raise BadInput(f"Stage {stage.name!r} moves a tool twice.")
         unknown = set(self.scan_supports) - boards
         if unknown:
             raise BadInput(f"Scan supports {sorted(unknown)} are not boards of the scenario.")
         if self.rest_shape not in ("from-gravity", "as-scanned"):
             raise BadInput(f"rest_shape must be from-gravity or as-scanned, not {self.rest_shape!r}.")
+
+    def tool_pose(self, tool: str, stage: str) -> RigidTransform:
+        """Where a carried tool's points of the scan are at a stage's end."""
+        rotation, translation = np.eye(3), np.zeros(3)
+        for known in self.stages:
+            for motion in known.motions:
+                if motion.tool == tool:
+                    pose = motion.pose(1.0)
+                    rotation, translation = pose.rotation @ rotation, pose.apply(translation)
+            if known.name == stage:
+                break
+        return RigidTransform("patient", "patient", rotation, translation)

@@ -5,7 +5,20 @@ from typing import Any, cast
 
 import tomli_w
 
-from glisson.core import Board, ContactLaw, Lever, LeverDrive, Move, Scenario, Stage
+from glisson.core import (
+    Board,
+    ContactLaw,
+    Cylinder,
+    Lever,
+    LeverDrive,
+    MeshTool,
+    Move,
+    Scenario,
+    Slot,
+    Stage,
+    ToolMotion,
+    TriangleSurface,
+)
 from glisson.core.arrays import FloatArray
 from glisson.io.atomic import atomic_path
 from glisson.io.records import Record, read_record
@@ -17,7 +30,7 @@ _DIRECTIONS = ("scan_gravity", "surgery_gravity")
 
 
 def read_scenario(path: str | Path) -> Scenario:
-    """Read a scenario; tools come out as boards first, then levers.
+    """Read a scenario; tools come out as boards first, then levers, cylinders and mesh tools.
 
     Raises:
         BadInput: absent, damaged, of a newer Glisson; an unknown key, a wrong type or an impossible value,
@@ -26,8 +39,10 @@ def read_scenario(path: str | Path) -> Scenario:
     with read_record(Path(path), "a scenario", SCHEMA) as record:
         boards = [_board(entry) for entry in record.records("boards", ())]
         levers = [_lever(entry) for entry in record.records("levers", ())]
+        cylinders = [_cylinder(entry) for entry in record.records("cylinders", ())]
+        meshes = [_mesh_tool(entry) for entry in record.records("mesh_tools", ())]
         return Scenario(
-            tools=(*boards, *levers),
+            tools=(*boards, *levers, *cylinders, *meshes),
             stages=tuple(_stage(entry) for entry in record.records("stages")),
             scan_gravity=_direction(record, "scan_gravity"),
             surgery_gravity=_direction(record, "surgery_gravity"),
@@ -51,6 +66,8 @@ def write_scenario(path: str | Path, scenario: Scenario) -> None:
     table["scan_supports"] = list(scenario.scan_supports)
     table["boards"] = [_board_table(tool) for tool in scenario.tools if isinstance(tool, Board)]
     table["levers"] = [_lever_table(tool) for tool in scenario.tools if isinstance(tool, Lever)]
+    table["cylinders"] = [_cylinder_table(tool) for tool in scenario.tools if isinstance(tool, Cylinder)]
+    table["mesh_tools"] = [_mesh_tool_table(tool) for tool in scenario.tools if isinstance(tool, MeshTool)]
     table["stages"] = [_stage_table(stage) for stage in scenario.stages]
     with atomic_path(path) as temporary:
         temporary.write_text(tomli_w.dumps(table, multiline_strings=False), encoding="utf-8")
@@ -67,6 +84,18 @@ def _board(record: Record) -> Board:
             record.floats("point_mm", 3),
             record.floats("normal", 3),
             record.flag("conforming", Board.conforming),
+            _slot(record.record("slot")) if record.has("slot") else None,
+        )
+
+
+def _slot(record: Record) -> Slot:
+    with record.building():
+        return Slot(
+            record.floats("centre_mm", 3),
+            record.floats("along", 3),
+            record.number("length_mm"),
+            record.number("width_mm"),
+            record.number("edge_radius_mm", Slot.edge_radius_mm),
         )
 
 
@@ -80,6 +109,19 @@ def _lever(record: Record) -> Lever:
             arm=record.floats("arm", 3),
             **{size: record.number(size) for size in sizes if record.has(size)},
         )
+
+
+def _cylinder(record: Record) -> Cylinder:
+    with record.building():
+        return Cylinder(
+            record.text("name"), record.floats("start_mm", 3), record.floats("end_mm", 3), record.number("radius_mm")
+        )
+
+
+def _mesh_tool(record: Record) -> MeshTool:
+    with record.building():
+        surface = TriangleSurface(record.floats("vertices_mm", -1, 3), record.wholes("triangles", -1, 3))
+        return MeshTool(record.text("name"), surface, record.number("skin_mm", MeshTool.skin_mm))
 
 
 def _stage(record: Record) -> Stage:
@@ -96,12 +138,20 @@ def _stage(record: Record) -> Stage:
             fixed=record.texts("fixed", Stage.fixed),
             moves=tuple(_move(entry) for entry in record.records("moves", ())),
             gas_pressure_kpa=record.number("gas_pressure_kpa", Stage.gas_pressure_kpa),
+            motions=tuple(_motion(entry) for entry in record.records("motions", ())),
         )
 
 
 def _drive(record: Record) -> LeverDrive:
     with record.building():
         return LeverDrive(record.text("lever"), record.number_or_none("angle_deg"), record.number_or_none("force_n"))
+
+
+def _motion(record: Record) -> ToolMotion:
+    vectors = ("displacement_mm", "turn_deg", "about_mm")
+    with record.building():
+        given = {key: record.floats(key, 3).tolist() for key in vectors if record.has(key)}
+        return ToolMotion(record.text("tool"), **{key: tuple(value) for key, value in given.items()})
 
 
 def _move(record: Record) -> Move:
@@ -116,6 +166,17 @@ def _board_table(board: Board) -> dict[str, Any]:
         "point_mm": board.point_mm.tolist(),
         "normal": board.normal.tolist(),
         "conforming": board.conforming,
+        **({} if board.slot is None else {"slot": _slot_table(board.slot)}),
+    }
+
+
+def _slot_table(slot: Slot) -> dict[str, Any]:
+    return {
+        "centre_mm": slot.centre_mm.tolist(),
+        "along": slot.along.tolist(),
+        "length_mm": float(slot.length_mm),
+        "width_mm": float(slot.width_mm),
+        "edge_radius_mm": float(slot.edge_radius_mm),
     }
 
 
@@ -132,6 +193,30 @@ def _lever_table(lever: Lever) -> dict[str, Any]:
     }
 
 
+def _cylinder_table(cylinder: Cylinder) -> dict[str, Any]:
+    return {
+        "name": cylinder.name,
+        "start_mm": cylinder.start_mm.tolist(),
+        "end_mm": cylinder.end_mm.tolist(),
+        "radius_mm": float(cylinder.radius_mm),
+    }
+
+
+def _mesh_tool_table(tool: MeshTool) -> dict[str, Any]:
+    return {
+        "name": tool.name,
+        "vertices_mm": tool.surface.vertices.tolist(),
+        "triangles": tool.surface.triangles.tolist(),
+        "skin_mm": float(tool.skin_mm),
+    }
+
+
+def _motion_table(motion: ToolMotion) -> dict[str, Any]:
+    about = {} if motion.about_mm is None else {"about_mm": list(motion.about_mm)}
+    vectors = {"displacement_mm": list(motion.displacement_mm), "turn_deg": list(motion.turn_deg)}
+    return {"tool": motion.tool} | vectors | about
+
+
 def _stage_table(stage: Stage) -> dict[str, Any]:
     drives = []
     for drive in stage.drives:
@@ -146,4 +231,5 @@ def _stage_table(stage: Stage) -> dict[str, Any]:
         "drives": drives,
         "moves": [{"node_set": move.node_set, "displacement_mm": list(move.displacement_mm)} for move in stage.moves],
         "gas_pressure_kpa": float(stage.gas_pressure_kpa),
+        "motions": [_motion_table(motion) for motion in stage.motions],
     }

@@ -8,7 +8,7 @@ from glisson.core.arrays import FloatArray
 from glisson.core.deformation import ContactReport
 from glisson.core.units import newton_metres_from_internal, newtons_from_millinewtons
 from glisson.mechanics.body import Body
-from glisson.mechanics.tools import LeverTool
+from glisson.mechanics.lever_tool import LeverTool
 
 
 def report_contacts(body: Body, positions: FloatArray) -> tuple[ContactReport, ...]:

@@ -11,7 +11,8 @@ from glisson.core.mesh import TET_EDGES
 from glisson.core.model import Model
 from glisson.core.parameters import parameter
 from glisson.core.protocols import Progress, silent
-from glisson.core.scenario import Board, Scenario
+from glisson.core.scenario import Scenario
+from glisson.core.tools import Board
 from glisson.mechanics.body import Body
 from glisson.mechanics.contact import ToolContact
 from glisson.mechanics.contact_law import Cushion
@@ -96,8 +97,8 @@ class QuasiStatic:
         """The body in equilibrium at A, its tools' gaps settled."""
         parameters = self._parameters
         mesh = model.mesh
-        tools = [make_tool(tool) for tool in scenario.tools]
-        surface = surface_quadrature(mesh.nodes, mesh, face_parts(mesh, tools))
+        tools = [make_tool(tool, scenario.stages) for tool in scenario.tools]
+        surface = surface_quadrature(mesh.nodes, mesh, face_parts(mesh, tools, scenario.stages))
         rod = _rod(model)
         rest = self._rest_shape(model, scenario, surface, rod)
         stiffest = max(material.young_modulus_kpa for material in model.materials.values())

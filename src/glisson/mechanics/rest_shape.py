@@ -17,8 +17,8 @@ from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.errors import StageFailed
 from glisson.core.mesh import TetMesh
 from glisson.core.model import Material
-from glisson.core.scenario import Board
 from glisson.core.status import Status
+from glisson.core.tools import Board
 from glisson.mechanics.body import scatter_blocks
 from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.elements import SurfaceQuadrature, quadrature
@@ -205,7 +205,8 @@ class _InverseProblem:
 
 
 def _bed(board: Board, mesh: TetMesh, surface: SurfaceQuadrature, tolerance_mm: float, stiffness: float) -> _Bed:
-    heights = (surface.positions(mesh.nodes) - board.point_mm) @ board.normal
-    facing = surface.normals @ board.normal < _FACING
+    points = surface.positions(mesh.nodes)
+    heights = (points - board.point_mm) @ board.normal
+    facing = (surface.normals @ board.normal < _FACING) & board.carries(points)
     near = np.abs(heights) <= (np.inf if board.conforming else tolerance_mm)
     return _Bed(board.name, board.normal, np.flatnonzero(facing & near), stiffness, board.conforming)

@@ -15,12 +15,13 @@ from glisson.core.scenario import ContactLaw, Scenario, Stage
 from glisson.core.status import Status
 from glisson.core.units import STANDARD_GRAVITY_MM_S2, density_from_kg_m3, millinewtons_from_newtons
 from glisson.mechanics.body import Body, Drag, LoadState, ToolState
+from glisson.mechanics.carried_tool import CarriedTool
 from glisson.mechanics.contact import ToolContact
 from glisson.mechanics.contact_report import hinge_moment, report_contacts
 from glisson.mechanics.elements import lumped_volumes, nodal_volumes
+from glisson.mechanics.lever_tool import LeverTool
 from glisson.mechanics.newton import Newton, NewtonEnd
 from glisson.mechanics.sliding_rod import SlidingRod
-from glisson.mechanics.tools import LeverTool
 
 _SMALLEST_SHARE = 1.0 / 256.0  # of a stage: smaller load steps are not tried
 _SMALLEST_ANSWER = 1.0 / 16.0
@@ -85,7 +86,12 @@ class StageRunner:
         for drive in stage.drives:
             if drive.angle_deg is not None:
                 angles[self._contact_number(drive.lever)] = radians(drive.angle_deg)
-        if body.law != stage.contact and stage.drives:
+        for motion in stage.motions:
+            number = self._contact_number(motion.tool)
+            tool = body.contacts[number].tool
+            assert isinstance(tool, CarriedTool)  # the scenario was validated
+            angles[number] = tool.set_out(angles[number], motion)
+        if body.law != stage.contact and (stage.drives or stage.motions):
             # The law changes while the tools stand still, and only then do they move.
             end = self._ramp(stage, self._goal(law=stage.contact))
             if end.status is not Status.CONVERGED:
@@ -250,9 +256,10 @@ class StageRunner:
         self._note(stage, reach, end)
         for contact, touch in zip(body.contacts, body.touches(end.positions, update_friction=False), strict=True):
             name, touching = contact.tool.name, bool(len(touch.points))
-            if isinstance(contact.tool, LeverTool) and name in self._touched and not touching:
+            if contact.tool.moves and name in self._touched and not touching:
                 self._touched.discard(name)
-                self._events.append(Event("lost_contact", name, degrees(contact.angle)))
+                at = degrees(contact.angle) if isinstance(contact.tool, LeverTool) else None
+                self._events.append(Event("lost_contact", name, at))
             if touching:
                 self._touched.add(name)
 

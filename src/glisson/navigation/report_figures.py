@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from glisson.core.scenario import Lever
+from glisson.core.tools import Lever
 from glisson.navigation.figures.convergence import convergence_plot
 from glisson.navigation.figures.lever_cut import lever_cut
 from glisson.navigation.figures.organ_state import OrganState, state_after, state_before, wire_in

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from glisson.core.scenario import Board, ContactLaw, Lever, LeverDrive, Scenario, Stage
+from glisson.core.scenario import ContactLaw, LeverDrive, Scenario, Stage
+from glisson.core.tools import Board, Lever
 from glisson.phantom.proportions import Proportions
 
 LEVER_ANGLE_DEG = 22.0

@@ -7,8 +7,8 @@ import numpy as np
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.deformation import Deformation
 from glisson.core.mesh import TetMesh
-from glisson.core.scenario import Board, Lever
 from glisson.core.structures import Tumour
+from glisson.core.tools import Board, Lever
 from glisson.geometry.mapping import PointMap
 from glisson.geometry.quadratic import straight_boundary
 from glisson.geometry.shape_functions import shape_slopes

@@ -14,7 +14,7 @@ from glisson.core.arrays import FloatArray
 from glisson.core.errors import BadInput
 from glisson.core.mesh import TetMesh
 from glisson.core.parameters import parameter
-from glisson.core.scenario import Lever
+from glisson.core.tools import Lever
 
 DOWN = np.array([0.0, 1.0, 0.0])
 """Gravity of a patient who lies on the back, and of the organ on its board (LPS)."""

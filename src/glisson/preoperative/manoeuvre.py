@@ -8,7 +8,8 @@ import numpy as np
 from glisson.core.errors import BadInput
 from glisson.core.mesh import TetMesh
 from glisson.core.model import Model
-from glisson.core.scenario import Board, ContactLaw, LeverDrive, Scenario, Stage
+from glisson.core.scenario import ContactLaw, LeverDrive, Scenario, Stage
+from glisson.core.tools import Board
 from glisson.preoperative.lever_placement import DOWN, LeverLiftParameters, place_lever
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.mesh import TetMesh
 from glisson.core.model import Material, Model
-from glisson.core.scenario import Board
+from glisson.core.tools import Board
 from glisson.mechanics.body import Body
 from glisson.mechanics.contact import ToolContact
 from glisson.mechanics.contact_law import Cushion

@@ -11,6 +11,7 @@ from glisson.core.arrays import FloatArray
 from glisson.core.mesh import TetMesh
 from glisson.core.model import Material
 from glisson.core.scenario import ContactLaw
+from glisson.core.tools import Cylinder
 from glisson.mechanics.contact_law import Cushion
 from glisson.mechanics.cylinder import CylinderTool
 from glisson.mechanics.elements import surface_quadrature
@@ -47,7 +48,7 @@ def _drawn() -> list[Check]:
     mesh = _strip()
     low = mesh.nodes[:, 2] < mesh.nodes[:, 2].min() + 1e-9
     held = low & (mesh.nodes[:, 0] > 0.0)
-    cylinder = CylinderTool("cylinder", np.zeros(3), np.array([0.0, 1.0, 0.0]), _RADIUS)
+    cylinder = CylinderTool(Cylinder("cylinder", np.array([0.0, -50.0, 0.0]), np.array([0.0, 50.0, 0.0]), _RADIUS))
     fixed = np.repeat(held[:, None], 3, axis=1)
     material = Material("neo-hookean-log", 1000.0, 0.0)
     body = body_of(mesh, material, fixed, cushion=_CUSHION, stick_mm=0.005, tools=[cylinder])

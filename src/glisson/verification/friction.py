@@ -8,8 +8,9 @@ from scipy.optimize import brentq
 
 from glisson.core.deformation import Deformation
 from glisson.core.model import Material
-from glisson.core.scenario import Board, ContactLaw, Scenario, Stage
+from glisson.core.scenario import ContactLaw, Scenario, Stage
 from glisson.core.status import Status
+from glisson.core.tools import Board
 from glisson.core.units import STANDARD_GRAVITY_MM_S2, density_from_kg_m3
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
 from glisson.verification.bodies import body_of, box_mesh, box_model, equilibrium, floor

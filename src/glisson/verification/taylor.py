@@ -7,23 +7,34 @@ from typing import Any
 import numpy as np
 
 from glisson.core.arrays import FloatArray
-from glisson.core.mesh import TetMesh
+from glisson.core.mesh import TetMesh, TriangleSurface
 from glisson.core.model import Capsule, Material, Rod
-from glisson.core.scenario import ContactLaw, Lever
+from glisson.core.scenario import ContactLaw
 from glisson.core.structures import Curve
+from glisson.core.tools import Board, Cylinder, Lever, MeshTool, Slot
 from glisson.mechanics.body import Body
 from glisson.mechanics.contact import Touch
 from glisson.mechanics.contact_law import Cushion, shear_share, shear_slope, slip_energy
 from glisson.mechanics.cylinder import CylinderTool
 from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.gas_pressure import GasPressure
+from glisson.mechanics.lever_tool import LeverTool
 from glisson.mechanics.materials.law import find_law
 from glisson.mechanics.membrane import Membrane
 from glisson.mechanics.parts import Part
 from glisson.mechanics.pattern import block_pattern
 from glisson.mechanics.sliding_rod import SlidingRod
-from glisson.mechanics.tools import LeverTool, RigidTool, make_tool
-from glisson.verification.bodies import FRAME_INDIFFERENT, LAWS, body_of, box_mesh, distorted, floor, material_of
+from glisson.mechanics.tools import RigidTool, make_tool
+from glisson.verification.bodies import (
+    FRAME_INDIFFERENT,
+    LAWS,
+    body_of,
+    box_mesh,
+    distorted,
+    floor,
+    mapped,
+    material_of,
+)
 from glisson.verification.check import Case, Check, NoSolution, taylor_check, vanishing
 
 
@@ -197,7 +208,8 @@ def _tool(name: str, tool: RigidTool) -> list[Check]:
     """Normal and curvature of a tool's distance, at points outside it."""
     rng = np.random.default_rng(0)
     points = rng.uniform([-20, -20, -20], [80, 20, 20], (200, 3))
-    points = points[tool.distance(points) > 1.0]
+    gaps = tool.distance(points)
+    points = points[(gaps > 1.0) & (gaps < 10.0)]
     direction = rng.uniform(-1, 1, points.shape)
     normals, hessians = tool.derivatives(points)
 
@@ -215,18 +227,33 @@ def _tool(name: str, tool: RigidTool) -> list[Check]:
     ]
 
 
+def _wedge() -> TriangleSurface:
+    """A box whose upper side slopes."""
+    mesh = mapped(box_mesh((50.0, 20.0, 10.0), (1, 1, 1)), lambda p: p * [1.0, 1.0, 1.0] + 0.1 * p[:, :1] * [0, 0, 1])
+    return TriangleSurface(mesh.nodes - [0.0, 10.0, 5.0], mesh.boundary()[0])
+
+
 _LEVER = Lever.lifting("lever", np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0]), length_mm=60.0)
 _TOOLS: dict[str, RigidTool] = {
     "lever": LeverTool(_LEVER),
-    "cylinder": CylinderTool("cylinder", np.zeros(3), np.array([0.3, 0.2, 0.9]), 5.0),
+    "cylinder": CylinderTool(Cylinder("cylinder", np.zeros(3), np.array([12.0, 8.0, 36.0]), 5.0)),
+    "slotted-board": make_tool(
+        Board(
+            "board",
+            np.array([0.0, 0.0, -5.0]),
+            np.array([0.0, 0.0, 1.0]),
+            slot=Slot(np.array([20.0, 0.0, -5.0]), np.array([1.0, 0.0, 0.0]), 60.0, 20.0, edge_radius_mm=3.0),
+        )
+    ),
+    "mesh": make_tool(MeshTool("mesh", _wedge(), skin_mm=2.0)),
 }
 # Below the block, which begins at z = 0: a flat one, a wide one whose face and rounded edge touch, and a round one.
 _FLOOR = make_tool(floor(0.05))
 _EDGE = LeverTool(
     Lever.lifting("lever", np.array([10.0, 15.0, 0.04]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
 )
-_ROUND = CylinderTool("cylinder", np.array([20.0, 15.0, -4.95]), np.array([1.0, 0.3, 0.0]), 5.0)
-_CONTACTS = {
+_ROUND = CylinderTool(Cylinder("cylinder", np.array([-30.0, 0.0, -4.95]), np.array([70.0, 30.0, -4.95]), 5.0))
+_CONTACTS: dict[str, tuple[ContactLaw, RigidTool]] = {
     "floor-frictionless": (ContactLaw(0.0), _FLOOR),
     "floor-friction": (ContactLaw(0.3), _FLOOR),
     "floor-cohesion": (ContactLaw(0.3, 2.0), _FLOOR),

@@ -9,8 +9,9 @@ from matplotlib.figure import Figure
 
 from glisson.core.arrays import FloatArray
 from glisson.core.model import Model
-from glisson.core.scenario import Board, Lever, Scenario
+from glisson.core.scenario import Scenario
 from glisson.core.structures import Plane
+from glisson.core.tools import Board, Lever
 from glisson.geometry.section import section
 from glisson.navigation.figures.colours import BLUE, LEVER, VERMILLION
 from glisson.navigation.figures.organ_state import OrganState, wire_in

@@ -8,8 +8,9 @@ from glisson.core.arrays import FloatArray
 from glisson.core.deformation import Deformation, StageResult
 from glisson.core.mesh import TriangleSurface
 from glisson.core.model import Model
-from glisson.core.scenario import Board, Lever, Scenario
+from glisson.core.scenario import Scenario
 from glisson.core.structures import Plane
+from glisson.core.tools import Board, Cylinder, Lever
 from glisson.geometry.mapping import PointMap
 from glisson.geometry.planes import plane_basis
 from glisson.geometry.quadratic import boundary_surface
@@ -29,13 +30,17 @@ _SUNK_MM = 1.0
 
 @dataclass(frozen=True, eq=False)
 class OrganState:
-    """Outer surface in mm, displacement of its vertices (n,) in mm, material points' map (None: A), lever angles."""
+    """Outer surface in mm, displacement of its vertices (n,) in mm, material points' map (None: A), lever angles.
+
+    `stage` is the one at whose end this is; None before all of them.
+    """
 
     title: str
     surface: TriangleSurface
     moved_mm: FloatArray
     point_map: PointMap | None
     angles_deg: dict[str, float]
+    stage: str | None = None
 
     def place(self, points: FloatArray) -> FloatArray:
         """Where material points (n, 3) of A are now."""
@@ -55,7 +60,7 @@ def state_after(deformation: Deformation, stage: StageResult, scenario: Scenario
     rest, surface = boundary_surface(mesh), boundary_surface(mesh, mesh.moved(stage.displacement))
     moved = np.linalg.norm(surface.vertices - rest.vertices, axis=1)
     angles = lever_angles(deformation, stage, scenario)
-    return OrganState(title, surface, moved, PointMap(mesh, stage.displacement), angles)
+    return OrganState(title, surface, moved, PointMap(mesh, stage.displacement), angles, stage.name)
 
 
 def lever_angles(deformation: Deformation, stage: StageResult, scenario: Scenario) -> dict[str, float]:
@@ -109,13 +114,23 @@ def wire_in(state: OrganState, model: Model) -> Wire | None:
 
 
 def tool_bodies(state: OrganState, scenario: Scenario) -> list[Body]:
-    """Levers at their angle, and each flat board as a checkerboard of one-inch squares under the organ."""
+    """Moving tools where they are, and each flat board as a checkerboard of one-inch squares under the organ."""
     bodies = []
     for tool in scenario.tools:
         if isinstance(tool, Lever):
             bodies.append(Body(*lever_bar(tool, state.angles_deg[tool.name]), LEVER, smooth=False))
-        elif not tool.conforming:
-            bodies.append(_checkerboard(tool, state.surface.vertices, scenario))
+        elif isinstance(tool, Board):
+            if not tool.conforming:
+                bodies.append(_checkerboard(tool, state.surface.vertices, scenario))
+        else:
+            vertices, triangles = (
+                tube(np.stack([tool.start_mm, tool.end_mm]), tool.radius_mm)
+                if isinstance(tool, Cylinder)
+                else (tool.surface.vertices, tool.surface.triangles)
+            )
+            if state.stage is not None:
+                vertices = scenario.tool_pose(tool.name, state.stage).apply(vertices)
+            bodies.append(Body(vertices, triangles, LEVER, smooth=isinstance(tool, Cylinder)))
     return bodies
 
 

@@ -6,8 +6,9 @@ from matplotlib.colors import ListedColormap, Normalize
 
 from glisson.core.arrays import FloatArray
 from glisson.core.model import Model
-from glisson.core.scenario import Lever, Scenario
+from glisson.core.scenario import Scenario
 from glisson.core.structures import Plane
+from glisson.core.tools import Lever
 from glisson.geometry.planes import plane_basis
 from glisson.navigation.figures.colours import LIVER, PLANE, REMOVED, displacement_colours, side_colours
 from glisson.navigation.figures.organ_state import OrganState, inner_bodies, legend, liver_body, tool_bodies

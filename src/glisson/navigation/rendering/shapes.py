@@ -4,8 +4,8 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from glisson.core.arrays import FloatArray, IntArray
-from glisson.core.scenario import Lever
 from glisson.core.structures import VesselTree
+from glisson.core.tools import Lever
 
 _SIDES = 14
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.mesh import TET_EDGES, TET_FACES, TetMesh
 from glisson.core.model import Material
-from glisson.core.scenario import Lever
+from glisson.core.tools import Lever
 from glisson.phantom.calculix.deck import FACE_OPPOSITE_CORNER, Deck, Increments, PenaltyContact
 from glisson.phantom.calculix.rigid_bodies import board_panels, lever_mesh, turned
 from glisson.phantom.heterogeneity import stiffness_levels

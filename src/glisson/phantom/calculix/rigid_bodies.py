@@ -4,7 +4,7 @@ import numpy as np
 
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.mesh import TetMesh
-from glisson.core.scenario import Lever
+from glisson.core.tools import Lever
 
 _EDGE_ANGLES = np.deg2rad([45.0, 30.0, 15.0, 0.0])
 

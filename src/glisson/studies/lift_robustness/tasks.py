@@ -10,7 +10,8 @@ import numpy as np
 from glisson.core.deformation import Deformation
 from glisson.core.mesh import TetMesh
 from glisson.core.model import Material
-from glisson.core.scenario import Board, Lever, LeverDrive, Scenario
+from glisson.core.scenario import LeverDrive, Scenario
+from glisson.core.tools import Board, Lever
 from glisson.core.units import radians
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
 from glisson.phantom.lever_lift import lever_lift
@@ -78,9 +79,6 @@ def _checks(deformation: Deformation, scenario: Scenario, angle_deg: float) -> d
 def _node_gaps(mesh: TetMesh, nodes: Any, scenario: Scenario, angle_rad: float) -> Any:
     """Gaps (tools, n) of the surface's nodes."""
     points = nodes[surface_nodes(mesh)]
-    return np.stack(
-        [
-            height_over_board(points, tool) if isinstance(tool, Board) else gap_to_lever(points, tool, angle_rad)
-            for tool in scenario.tools
-        ]
-    )
+    boards = [height_over_board(points, tool) for tool in scenario.tools if isinstance(tool, Board)]
+    levers = [gap_to_lever(points, tool, angle_rad) for tool in scenario.tools if isinstance(tool, Lever)]
+    return np.stack([*boards, *levers])
