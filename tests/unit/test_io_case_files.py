@@ -106,6 +106,7 @@ def model(quadratic=False) -> Model:
         Capsule(900.0, 0.2),
         {"back": 2.5},
         Rod(12.5, 80.0, 0.2, 0.01),
+        ("back",),
     )
 
 

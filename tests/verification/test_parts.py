@@ -171,3 +171,55 @@ def test_regions_of_two_laws_in_series_share_one_pull() -> None:
         return uniaxial(place / 20.0, soft)[1] - uniaxial((46.0 - place) / 20.0, stiff)[1]
 
     assert border - 20.0 == pytest.approx(brentq(excess, 20.0, 26.0) - 20.0, rel=0.01)
+
+
+def _tied(counts: tuple[int, int, int]) -> Model:
+    """A bar of two boxes side by side along x, each with nodes of its own on the face between them."""
+    first, second = box_mesh((15.0, 20.0, 10.0), (3, 4, 2)), box_mesh((15.0, 20.0, 10.0), counts)
+    nodes = np.vstack([first.nodes, second.nodes + [15.0, 0.0, 0.0]])
+    mesh = TetMesh(nodes, np.vstack([first.tetrahedra, second.tetrahedra + len(first.nodes)]))
+    own = np.arange(len(nodes)) < len(first.nodes)
+    x = nodes[:, 0]
+    return box_model(
+        mesh,
+        SOFT,
+        left=np.flatnonzero(x == 0.0),
+        right=np.flatnonzero(x == 30.0),
+        face=np.flatnonzero(own & (x == 15.0)),
+    )
+
+
+BEND = Stage("bend", FREE, gravity=False, fixed=("left",), moves=(Move("right", (0.0, 0.0, 6.0)),))
+
+
+def test_two_parts_tied_node_by_node_are_one() -> None:
+    whole = box_mesh((30.0, 20.0, 10.0), (6, 4, 2))
+    x = whole.nodes[:, 0]
+    one = _solved(box_model(whole, SOFT, left=np.flatnonzero(x == 0.0), right=np.flatnonzero(x == 30.0)), BEND)
+    two = _solved(replace(_tied((3, 4, 2)), ties=("face",)), BEND)
+    assert one.status is two.status is Status.CONVERGED, two.message
+    moved = PointMap(one.mesh, one.displacement).forward(two.mesh.nodes)
+    np.testing.assert_allclose(two.mesh.nodes + two.displacement, moved, atol=1e-5)
+
+
+def test_parts_of_other_meshes_are_tied() -> None:
+    """Onto a part cut otherwise: tied nodes lie in its faces, and it bends as the whole does."""
+    one, other = (_solved(replace(_tied(counts), ties=("face",)), BEND) for counts in ((3, 4, 2), (4, 5, 3)))
+    assert one.status is other.status is Status.CONVERGED, other.message
+    points = np.random.default_rng(0).uniform([1.0, 1.0, 1.0], [29.0, 19.0, 9.0], (200, 3))
+    places = [PointMap(answer.mesh, answer.displacement).forward(points) for answer in (one, other)]
+    assert np.linalg.norm(places[1] - places[0], axis=1).max() < 0.05
+    face = _tied((4, 5, 3)).node_set("face")
+    beside = PointMap(TetMesh(other.mesh.nodes, other.mesh.tetrahedra[_beyond(other.mesh)]), other.displacement)
+    tied = other.mesh.nodes[face]
+    np.testing.assert_allclose(beside.forward(tied), tied + other.displacement[face], atol=1e-5)
+
+
+def _beyond(mesh: TetMesh) -> np.ndarray:
+    return np.flatnonzero(mesh.nodes[mesh.corners].mean(axis=1)[:, 0] > 15.0)
+
+
+def test_ties_to_nothing_are_refused() -> None:
+    model = replace(_tied((3, 4, 2)), ties=("right",))
+    with pytest.raises(BadInput, match="mm away from the part"):
+        _solved(model, BEND)

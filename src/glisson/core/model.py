@@ -98,7 +98,8 @@ class Model:
     `materials` maps region numbers of the mesh to materials, `region_names` to names for people,
     `node_sets` names to node numbers (attachments such as "back"). `ligaments` maps node sets to the stiffness in
     kPa/mm with which they are drawn back to where they are in A; node sets that are held fast belong to the stages.
-    `rod` gives the wire in the duct a stiffness of its own.
+    `rod` gives the wire in the duct a stiffness of its own. `ties` names node sets that stay where they lie in another
+    part of the mesh, with which they share no nodes.
     """
 
     mesh: TetMesh
@@ -109,6 +110,7 @@ class Model:
     capsule: Capsule | None = None
     ligaments: Mapping[str, float] = field(default_factory=dict)
     rod: Rod | None = None
+    ties: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         present = {int(n) for n in np.unique(self.mesh.region_numbers)}
@@ -127,6 +129,8 @@ class Model:
             if not 0.0 < stiffness < np.inf:
                 raise BadInput(f"Ligament {name!r} needs a positive stiffness, not {stiffness} kPa/mm.")
         object.__setattr__(self, "ligaments", MappingProxyType(dict(self.ligaments)))
+        for name in self.ties:
+            self.node_set(name)
         if self.rod is not None and self.structures.duct is None:
             raise BadInput("A rod needs a duct to lie in; label the duct or the wire.")
 

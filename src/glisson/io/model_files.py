@@ -28,6 +28,7 @@ def write_model(folder: str | Path, model: Model) -> None:
         "node_sets": dict(model.node_sets),
         "structures": _structures_table(model.structures),
         "ligaments": dict(model.ligaments),
+        "ties": list(model.ties),
     }
     if model.capsule is not None:
         values["capsule"] = asdict(model.capsule)
@@ -52,6 +53,7 @@ def read_model(folder: str | Path) -> Model:
             node_sets={key: sets.wholes(key, -1) for key in sets.keys()},  # noqa: SIM118
             structures=_structures(record.record("structures")),
             capsule=_capsule(record.record("capsule")) if record.has("capsule") else None,
+            ties=record.texts("ties", ()),
             rod=_rod(record.record("rod")) if record.has("rod") else None,
             ligaments=_ligaments(record.record("ligaments")) if record.has("ligaments") else {},
         )

@@ -25,10 +25,12 @@ from glisson.mechanics.linear_solvers import make_iterative_solver
 from glisson.mechanics.membrane import Membrane
 from glisson.mechanics.newton import Newton, NewtonSettings
 from glisson.mechanics.numbering import numbering
+from glisson.mechanics.parts import Part
 from glisson.mechanics.rest_shape import RestShape, find_rest_shape
 from glisson.mechanics.sampling import face_parts
 from glisson.mechanics.sliding_rod import SlidingRod
 from glisson.mechanics.stages import StageRunner, fixed_unknowns, gravity_forces
+from glisson.mechanics.ties import Ties
 from glisson.mechanics.tools import make_tool
 
 _CUSHION_STIFFNESS_KPA = 36.0  # over the range; see `Cushion`
@@ -112,8 +114,10 @@ class QuasiStatic:
         fixed = fixed_unknowns(model, scenario.stages[0].fixed)
         ligaments = ElasticAttachments(model, model.ligaments)
         gas = GasPressure(mesh) if any(stage.gas_pressure_kpa for stage in scenario.stages) else None
-        capsule = () if model.capsule is None else (Membrane(mesh, model.capsule),)
-        parts = (*capsule, *((ligaments,) if model.ligaments else ()), *(() if rod is None else (rod,)))
+        parts: list[Part] = [] if model.capsule is None else [Membrane(mesh, model.capsule)]
+        parts += [ligaments] if model.ligaments else []
+        parts += [] if rod is None else [rod]
+        parts += [Ties(model, model.ties)] if model.ties else []
         body = Body(elasticity, surface, contacts, fixed, parts, gas)
         if scenario.rest_shape == "from-gravity":
             body.external = gravity_forces(model, scenario.scan_gravity)
