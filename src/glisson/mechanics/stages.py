@@ -233,6 +233,12 @@ class StageRunner:
         for _ in range(_STIFFENINGS):
             if not penetrated:
                 break
+            where = self._held_inside(penetrated[0])
+            if where is not None:
+                reason = (
+                    f"{penetrated[0].tool.name!r} cuts into a part that is held fast, at ({where}) mm; move it away"
+                )
+                return replace(end, status=Status.STAGNATED, reason=reason)
             for contact in penetrated:
                 contact.cushion = contact.cushion.stiffened(_FIRMER)
             end = self._load_step(body.loading)
@@ -248,6 +254,15 @@ class StageRunner:
         """Tools, other than yielding ones, inside which a surface point lies."""
         points = self._body.surface.positions(self._positions)
         return [c for c in self._body.contacts if not c.tool.yields and float(c.gaps(points).min()) <= 0.0]
+
+    def _held_inside(self, contact: ToolContact) -> str | None:
+        """Where a tool is deepest in the organ, if that is a part that can't give way."""
+        body = self._body
+        points = body.surface.positions(self._positions)
+        deepest = int(contact.gaps(points).argmin())
+        if not body.fixed[body.surface.nodes[deepest]].all():
+            return None
+        return ", ".join(f"{x:.0f}" for x in points[deepest])
 
     def _accept(self, stage: Stage, reach: float, end: NewtonEnd) -> None:
         body = self._body
