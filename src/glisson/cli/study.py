@@ -10,6 +10,7 @@ from glisson.cli.progress import StageLines
 from glisson.core.errors import BadInput
 from glisson.io.atomic import atomic_path
 from glisson.studies.dask_cluster import DaskCluster
+from glisson.studies.elements.study import Elements
 from glisson.studies.executor import Executor
 from glisson.studies.lift_robustness.study import LiftRobustness
 from glisson.studies.local_pool import LocalPool
@@ -17,6 +18,7 @@ from glisson.studies.sensitivity.study import Sensitivity
 from glisson.studies.study import Study, run_study
 
 STUDIES = {
+    "elements": "how much error linear and quadratic elements leave in the same time",
     "lift-robustness": "whether the lever lift converges whatever liver, lever, tissue and contact",
     "sensitivity": "how much mesh, law, stiffness, compressibility and contact move the tumour's place",
 }
@@ -55,6 +57,8 @@ def _study(arguments: argparse.Namespace) -> Study:
     if arguments.study == LiftRobustness.name:
         seed = _whole_number(arguments.seed, "--seed", 0)
         return LiftRobustness.of(arguments.quick, seed or 0)
+    if arguments.study == Elements.name:
+        return Elements.of(arguments.quick)
     return Sensitivity.of(arguments.quick, arguments.long, arguments.element)
 
 

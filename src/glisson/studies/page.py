@@ -1,5 +1,6 @@
 """A study for people: one self-contained page of sentences, figures and tables, in the look of a case's report."""
 
+from base64 import b64decode
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -39,6 +40,11 @@ def page_as_html(page: Page) -> bytes:
     )
     text = environment.get_template("study.html.jinja").render(page=page, version=glisson.__version__)
     return text.encode()
+
+
+def png(shown: Picture) -> bytes:
+    """A figure as a file."""
+    return b64decode(shown.source.partition(",")[2])
 
 
 def number(value: float | None, digits: int = 2) -> str:

@@ -1,6 +1,5 @@
 """The bar charts of the dissertation's figures II.20 to II.23: the tumour's error by mesh, for two or three levels."""
 
-from base64 import b64decode
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -29,11 +28,6 @@ def draw_charts(rows: Sequence[Row], truths: Sequence[Truth], meshes: Sequence[s
         f"figure-{number.replace('.', '-')}-{name}.png": _chart(rows, truths, meshes, factor, title, number)
         for name, (number, factor, title) in _CHARTS.items()
     }
-
-
-def png(shown: Picture) -> bytes:
-    """A chart as a file."""
-    return b64decode(shown.source.partition(",")[2])
 
 
 def _chart(

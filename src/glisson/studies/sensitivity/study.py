@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 from glisson.core.errors import StageFailed
 from glisson.core.status import Status
 from glisson.phantom.lift_truths import lift_truth
+from glisson.studies.page import png
 from glisson.studies.point import Outcome, Point
 from glisson.studies.sensitivity.choices import (
     LONG_SIZES,
@@ -20,7 +21,7 @@ from glisson.studies.sensitivity.choices import (
     all_together,
     one_at_a_time,
 )
-from glisson.studies.sensitivity.figures import draw_charts, png
+from glisson.studies.sensitivity.figures import draw_charts
 from glisson.studies.sensitivity.rows import Truth, compared, effects, truth_values
 from glisson.studies.sensitivity.tasks import CALCULIX, LIFT, MESH, TWIN, choice_inputs
 from glisson.studies.sensitivity.telling import as_page, as_text

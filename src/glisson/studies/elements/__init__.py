@@ -1,0 +1,1 @@
+"""Which element gives the smallest error of a target's place in the same time."""
