@@ -23,6 +23,7 @@ from glisson.core import (
 from glisson.core.mesh import TetMesh
 from glisson.geometry.mapping import PointMap
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
+from glisson.mechanics.self_contact import SelfContact
 from glisson.navigation.wire import Wire, carried_wire
 from glisson.verification.bodies import box_mesh, box_model
 from glisson.verification.closed_forms import uniaxial
@@ -223,3 +224,62 @@ def test_ties_to_nothing_are_refused() -> None:
     model = replace(_tied((3, 4, 2)), ties=("right",))
     with pytest.raises(BadInput, match="mm away from the part"):
         _solved(model, BEND)
+
+
+def _stacked(gap_mm: float) -> Model:
+    """Two blocks of one mesh, one above the other, with a gap between them."""
+    lower, upper = box_mesh((20.0, 20.0, 10.0), (3, 3, 2)), box_mesh((20.0, 20.0, 10.0), (4, 4, 2))
+    nodes = np.vstack([lower.nodes, upper.nodes + [0.0, 0.0, 10.0 + gap_mm]])
+    mesh = TetMesh(nodes, np.vstack([lower.tetrahedra, upper.tetrahedra + len(lower.nodes)]))
+    z = nodes[:, 2]
+    low, high = np.flatnonzero(z == 0.0), np.flatnonzero(z == z.max())
+    return box_model(mesh, Material("linear-elastic", 10.0, 0.0), low=low, high=high)
+
+
+@pytest.mark.parametrize("element", ["T4", "T10"])
+def test_an_organ_that_folds_onto_itself_pushes_back(element: str) -> None:
+    """Two blocks pressed together shorten alike; without self-contact they pass through each other."""
+    press = Stage("press", FREE, gravity=False, fixed=("low",), moves=(Move("high", (0.0, 0.0, -2.0)),))
+    scenario = Scenario((), (press,), rest_shape="as-scanned")
+    solver = QuasiStatic(QuasiStaticParameters(element=element, self_contact=True))
+    answer = solver.solve(_stacked(0.6), scenario)
+    assert answer.status is Status.CONVERGED, answer.message
+    mesh = answer.mesh
+    moved = mesh.nodes + answer.displacement
+    z = mesh.nodes[:, 2]
+    gap = moved[z == 10.6, 2].mean() - moved[z == 10.0, 2].mean()
+    assert 0.0 < gap < 0.12
+    assert moved[z > 10.0, 2].min() > moved[z <= 10.0, 2].max()
+    # Each block is shortened by half of what the gap leaves of the way, its middle by a half of that.
+    shortened = 0.5 * (2.0 - 0.6 + gap)
+    assert answer.displacement[z == 5.0, 2].mean() == pytest.approx(-0.5 * shortened, rel=0.02)
+    plain = QuasiStatic(QuasiStaticParameters(element=element)).solve(_stacked(0.6), scenario)
+    np.testing.assert_allclose(plain.displacement[plain.mesh.nodes[:, 2] <= 10.0], 0.0, atol=1e-9)
+
+
+def test_self_contact_is_the_derivative_of_its_energy() -> None:
+    model = _stacked(0.05)
+    mesh = model.mesh.as_quadratic()
+    part = SelfContact(mesh, 0.1, 10.0)
+    rng = np.random.default_rng(0)
+    positions = mesh.nodes + rng.uniform(-0.005, 0.005, mesh.nodes.shape)
+    direction = rng.uniform(-1.0, 1.0, mesh.nodes.shape)
+    groups, local = part.stiffness(positions, project=False)
+    change = np.zeros_like(positions)
+    np.add.at(change, groups, np.einsum("kabij,kbj->kai", local, direction[groups]))
+    assert np.abs(part.forces(positions)).max() > 0.1
+
+    def energy_rest(h: float) -> float:
+        there = part.energy(positions + h * direction) - part.energy(positions)
+        return abs(there + h * float(np.vdot(part.forces(positions), direction)))
+
+    def force_rest(h: float) -> float:
+        return float(np.abs(part.forces(positions + h * direction) - part.forces(positions) + h * change).max())
+
+    for rest in (energy_rest, force_rest):
+        assert np.log(rest(1e-5) / rest(1e-6)) / np.log(10.0) == pytest.approx(2.0, abs=0.1)
+
+
+def test_a_surface_that_cuts_itself_is_refused() -> None:
+    with pytest.raises(BadInput, match="cuts itself in the scanned shape"):
+        SelfContact(_stacked(-1.0).mesh, 0.1, 10.0)

@@ -28,6 +28,7 @@ from glisson.mechanics.numbering import numbering
 from glisson.mechanics.parts import Part
 from glisson.mechanics.rest_shape import RestShape, find_rest_shape
 from glisson.mechanics.sampling import face_parts
+from glisson.mechanics.self_contact import SelfContact
 from glisson.mechanics.sliding_rod import SlidingRod
 from glisson.mechanics.stages import StageRunner, fixed_unknowns, gravity_forces
 from glisson.mechanics.ties import Ties
@@ -53,6 +54,7 @@ class QuasiStaticParameters:
     surface_tolerance_mm: float = parameter(
         2.0, "how far in mm the scanned surface may lie from a tool and still be taken as touching it", 0.0, 10.0
     )
+    self_contact: bool = parameter(False, "whether parts of the organ's surface keep each other off (needs ipctk)")
     iteration_limit: int = parameter(25, "Newton iterations allowed in one load step", 1, 10_000)
 
 
@@ -118,6 +120,8 @@ class QuasiStatic:
         parts += [ligaments] if model.ligaments else []
         parts += [] if rod is None else [rod]
         parts += [Ties(model, model.ties)] if model.ties else []
+        if parameters.self_contact:
+            parts.append(SelfContact(mesh, parameters.contact_range_mm, stiffest))
         body = Body(elasticity, surface, contacts, fixed, parts, gas)
         if scenario.rest_shape == "from-gravity":
             body.external = gravity_forces(model, scenario.scan_gravity)

@@ -199,10 +199,13 @@ class StageRunner:
         return replace(end, positions=before, status=Status.ITERATION_LIMIT, iterations=iterations)
 
     def _uninverted(self, moved: FloatArray) -> FloatArray | None:
-        """As much of a first-order answer as inverts no element; None where that would leave carried parts behind."""
+        """As much of a first-order answer as inverts no element and cuts no surface.
+
+        None where that would leave carried parts behind.
+        """
         step, share = moved - self._positions, 1.0
         while share > _SMALLEST_ANSWER:
-            if np.isfinite(self._body.elasticity.energy(self._positions + share * step)):
+            if np.isfinite(self._body.energy(self._positions + share * step)):
                 return self._positions + share * step
             if step[self._body.fixed].any():
                 return None
