@@ -103,6 +103,33 @@ def test_an_organ_that_flows_ends_where_it_would_have_gone_at_once(monkeypatch: 
     assert difference < 1e-3 * moved
 
 
+def test_both_readings_of_the_second_stage_run() -> None:
+    """The dissertation does not say what changes when the organ settles: its friction, or its weight that sets in.
+
+    Both settle on the lever, whose hinge then bears more of the weight in the second reading; the first moves only by
+    slipping, so the lifted part does not rise again.
+    """
+    lift_to = LeverDrive("lever", angle_deg=10.0)
+    sticky, plain = ContactLaw(0.1, 10.0), ContactLaw(0.1)
+    readings = {
+        "friction": (Stage("lift", sticky, (lift_to,)), Stage("settle", plain)),
+        "gravity": (Stage("lift", sticky, (lift_to,), gravity=False), Stage("settle", sticky)),
+    }
+    moments, sinking = {}, {}
+    for name, stages in readings.items():
+        scenario = Scenario((BOARD, WIDE), stages, DOWN, DOWN, ("board",))
+        answer = QuasiStatic(QuasiStaticParameters(element="T4")).solve(slab(7.0), scenario)
+        assert answer.status is Status.CONVERGED, answer.message
+        reports = [next(r for r in stage.contacts if r.tool == "lever") for stage in answer.stages]
+        moments[name] = [report.hinge_moment_nm for report in reports]
+        end = np.linalg.norm(answer.mesh.nodes - [120.0, 25.0, 25.0], axis=1).argmin()
+        sinking[name] = answer.stages[0].displacement[end, 2] - answer.stages[1].displacement[end, 2]
+    assert moments["gravity"][1] > 1.5 * moments["gravity"][0]
+    assert moments["friction"][1] == pytest.approx(moments["friction"][0], rel=0.2)
+    assert sinking["gravity"] > 0.5
+    assert sinking["friction"] > -1e-3
+
+
 def test_a_lever_that_misses_is_told() -> None:
     lever = Lever.lifting("lever", np.array([200.0, 20.0, 0.0]), np.array([1.0, 0, 0]), -DOWN)
     answer = lift(slab(7.0, (6, 2, 2)), LeverDrive("lever", angle_deg=10.0), lever)
