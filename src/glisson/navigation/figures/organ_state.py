@@ -10,7 +10,7 @@ from glisson.core.mesh import TriangleSurface
 from glisson.core.model import Model
 from glisson.core.scenario import Scenario
 from glisson.core.structures import Plane
-from glisson.core.tools import Board, Cylinder, Lever
+from glisson.core.tools import Board, Cylinder, Lever, MeshTool, Slot
 from glisson.geometry.mapping import PointMap
 from glisson.geometry.planes import plane_basis
 from glisson.geometry.quadratic import boundary_surface
@@ -24,6 +24,7 @@ _SQUARE_MM = 25.4
 """The board's squares: one inch, as on the dissertation's checkerboard."""
 
 _BOARD_MARGIN_MM = 22.0
+_SLOT = (0.22, 0.22, 0.25)
 _SUNK_MM = 1.0
 """How far the board is drawn below its place, lest it and the organ's underside shine through each other."""
 
@@ -122,6 +123,8 @@ def tool_bodies(state: OrganState, scenario: Scenario) -> list[Body]:
         elif isinstance(tool, Board):
             if not tool.conforming:
                 bodies.append(_checkerboard(tool, state.surface.vertices, scenario))
+            if tool.slot is not None:
+                bodies.append(_opening(tool, tool.slot))
         else:
             vertices, triangles = (
                 tube(np.stack([tool.start_mm, tool.end_mm]), tool.radius_mm)
@@ -145,7 +148,17 @@ def legend(model: Model, scenario: Scenario) -> dict[str, Rgb]:
         entries[kind_of(tree.name)] = structure_colour(tree.name)
     if any(isinstance(tool, Lever) for tool in scenario.tools):
         entries["lever"] = LEVER
+    if any(isinstance(tool, Cylinder | MeshTool) for tool in scenario.tools):
+        entries["tool"] = LEVER
     return entries
+
+
+def _opening(board: Board, slot: Slot) -> Body:
+    """A board's slot as a dark rectangle just over the board."""
+    across = np.cross(board.normal, slot.along)
+    centre = slot.centre_mm - 0.9 * _SUNK_MM * board.normal
+    half_along, half_across = 0.5 * slot.length_mm * slot.along, 0.5 * slot.width_mm * across
+    return Body(*patch(centre, half_along, half_across), _SLOT, smooth=False)
 
 
 def _checkerboard(board: Board, vertices: FloatArray, scenario: Scenario) -> Body:
