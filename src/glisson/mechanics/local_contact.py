@@ -7,7 +7,7 @@ exactly, the tools moving in as many small steps as they need. To the whole orga
 is left, on which Newton's method converges in a few iterations.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +21,8 @@ from glisson.mechanics.contact import ToolContact, Touch
 from glisson.mechanics.patch import Patch
 from glisson.mechanics.spring import Spring
 
-Solve = Callable[[FloatArray, FloatArray], FloatArray | None]
+_Pushes = tuple[IntArray, FloatArray]
+"""Points (p,) of the patch and the stiffness (p, 3, 3) in mN/mm with which a tool meets them."""
 
 _ITERATIONS = 40
 _FARTHEST_MM = 100.0  # displacements beyond it are no answer of a linearised organ
@@ -72,8 +73,9 @@ class LocalContact:
         self._contacts, self._patch, self._points = tuple(contacts), patch, points_mm
         self._spring, self._full_load, self._change, self._scale = spring, load, change, scale
         self._load = load
-        nodes = patch.surface.nodes
-        self._pairs = nodes[:, :, None] * len(patch.nodes) + nodes[:, None, :]
+        self._numbers = np.full(3 * len(patch.nodes), -1)  # of the unknowns
+        self._numbers[patch.unknowns] = np.arange(len(patch.unknowns))
+        self._last_touched: tuple[IntArray, FloatArray] | None = None
         self._law = ContactLaw()
 
     def settle(self, start: ToolState, goal: ToolState, tolerance: float) -> Settled | None:
@@ -160,11 +162,10 @@ class LocalContact:
         if residual > _COUPLED_RESIDUAL:
             return None
         points = self._moved(displacement)
-        blocks = self._stiffness(displacement, touches, project=False)
+        pushes = self._stiffness(displacement, touches, project=False)
         for contact, touch in zip(self._contacts, touches, strict=True):
-            self._add(blocks, *contact.friction_by_pressure(touch, points, self._law))
-        step = self._answer(blocks, unbalanced, _lu_solve)
-        assert step is not None  # a singular matrix gives a useless step
+            pushes.append(contact.friction_by_pressure(touch, points, self._law))
+        step = self._unsymmetric_answer(*self._on_touched(pushes), unbalanced)
         for length in _COUPLED_LENGTHS:
             moved: FloatArray = displacement + length * step
             found = self._unbalanced(moved, self._touches(moved))
@@ -193,11 +194,11 @@ class LocalContact:
     ) -> FloatArray | None:
         """Displacement (k,) under a force (k,); the stiffness is made definite only when Cholesky refuses it."""
         for projected in (True,) if project else (False, True):
-            blocks = self._stiffness(displacement, touches, projected)
-            step = self._answer(blocks, force, _cholesky_solve)
+            touched, stiffness = self._on_touched(self._stiffness(displacement, touches, projected))
+            step = self._answer(touched, stiffness, force)
             if step is not None:
                 return step
-        matrix = self._spring.stiffness + self._on_unknowns(blocks)
+        matrix = self._with_spring(touched, stiffness)
         diagonal = float(np.diag(matrix).mean())
         for share in _SHIFTS:
             step = _cholesky_solve(matrix + share * diagonal * np.eye(len(matrix)), force)
@@ -244,41 +245,73 @@ class LocalContact:
         touching = sum(contact.energy(points) for contact in self._contacts)
         return touching + float(displacement @ (0.5 * self._spring.stiffness @ displacement - self._load))
 
-    def _stiffness(self, displacement: FloatArray, touches: Sequence[Touch], project: bool) -> FloatArray:
-        """Blocks (m², 3, 3) of the contacts alone."""
-        blocks, points = np.zeros((len(self._patch.nodes) ** 2, 3, 3)), self._moved(displacement)
-        for contact, touch in zip(self._contacts, touches, strict=True):
-            self._add(blocks, *contact.stiffness(touch, points, project))
-        return blocks
+    def _stiffness(self, displacement: FloatArray, touches: Sequence[Touch], project: bool) -> list[_Pushes]:
+        """That of the contacts alone."""
+        points = self._moved(displacement)
+        return [
+            contact.stiffness(touch, points, project) for contact, touch in zip(self._contacts, touches, strict=True)
+        ]
 
-    def _add(self, blocks: FloatArray, used: IntArray, local: FloatArray) -> None:
-        scatter_blocks(used, local, self._patch.surface.shapes, self._pairs, blocks)
+    def _on_touched(self, pushes: Sequence[_Pushes]) -> tuple[IntArray, FloatArray]:
+        """The unknowns (t,) that are touched, and their dense stiffness (t, t)."""
+        surface = self._patch.surface
+        points = np.concatenate([used for used, _ in pushes])
+        nodes, local = np.unique(surface.nodes[points], return_inverse=True)
+        local = local.reshape(len(points), surface.shapes.shape[1])
+        count = len(nodes)
+        pairs = local[:, :, None] * count + local[:, None, :]
+        blocks = np.zeros((count**2, 3, 3))
+        values = np.concatenate([values for _, values in pushes])
+        scatter_blocks(np.arange(len(points)), values, surface.shapes[points], pairs, blocks)
+        matrix = blocks.reshape(count, count, 3, 3).transpose(0, 2, 1, 3).reshape(3 * count, 3 * count)
+        numbers = self._numbers[(3 * nodes[:, None] + np.arange(3)).ravel()]
+        free = np.flatnonzero(numbers >= 0)
+        return numbers[free], matrix if len(free) == len(matrix) else matrix[np.ix_(free, free)]
 
-    def _answer(self, blocks: FloatArray, force: FloatArray, solve: Solve) -> FloatArray | None:
-        """Displacement (k,) under a force (k,) of the spring with blocks (m², 3, 3); None where `solve` gives none.
+    def _with_spring(self, touched: IntArray, stiffness: FloatArray) -> FloatArray:
+        """The whole stiffness (k, k)."""
+        matrix: FloatArray = self._spring.stiffness.copy()
+        matrix[np.ix_(touched, touched)] += stiffness
+        return matrix
 
-        Where the spring has an inverse it is condensed further, onto the few nodes with blocks.
+    def _answer(self, touched: IntArray, stiffness: FloatArray, force: FloatArray) -> FloatArray | None:
+        """Displacement (k,) under a force (k,); None where the stiffness is not definite.
+
+        Where the spring has an inverse it is condensed further, onto what is touched.
         """
-        stiffness, compliance = self._on_unknowns(blocks), self._spring.compliance
+        compliance = self._spring.compliance
         if compliance is None:
-            return solve(self._spring.stiffness + stiffness, force)
-        used = np.flatnonzero(stiffness.any(axis=0))
+            return _cholesky_solve(self._with_spring(touched, stiffness), force)
         free = compliance @ force
-        if not len(used):
+        if not len(touched):
             return free
-        touching = stiffness[np.ix_(used, used)]
-        condensed = np.linalg.inv(compliance[np.ix_(used, used)])
-        moved = solve(0.5 * (condensed + condensed.T) + touching, condensed @ free[used])
+        condensed = self._condensed(touched, compliance)
+        moved = _cholesky_solve(condensed + stiffness, condensed @ free[touched])
         if moved is None:
             return None
-        answer: FloatArray = free - compliance[:, used] @ (touching @ moved)
+        answer: FloatArray = free - compliance[:, touched] @ (stiffness @ moved)
         return answer
 
-    def _on_unknowns(self, blocks: FloatArray) -> FloatArray:
-        """The dense matrix (k, k) of blocks (m², 3, 3)."""
-        count, free = len(self._patch.nodes), self._patch.unknowns
-        matrix = blocks.reshape(count, count, 3, 3).transpose(0, 2, 1, 3).reshape(3 * count, 3 * count)
-        return matrix if len(free) == len(matrix) else matrix[np.ix_(free, free)]
+    def _condensed(self, touched: IntArray, compliance: FloatArray) -> FloatArray:
+        """The spring (t, t) as what is touched feels it; kept for the next call, which mostly asks for the same."""
+        if self._last_touched is None or not np.array_equal(self._last_touched[0], touched):
+            condensed = np.linalg.inv(compliance[np.ix_(touched, touched)])
+            self._last_touched = touched, 0.5 * (condensed + condensed.T)
+        return self._last_touched[1]
+
+    def _unsymmetric_answer(self, touched: IntArray, stiffness: FloatArray, force: FloatArray) -> FloatArray:
+        """The same for a stiffness that is not symmetric; a singular one gives a useless displacement."""
+        compliance = self._spring.compliance
+        if compliance is None:
+            return _lu_solve(self._with_spring(touched, stiffness), force)
+        free: FloatArray = compliance @ force
+        if not len(touched):
+            return free
+        matrix = compliance[np.ix_(touched, touched)] @ stiffness
+        matrix[np.diag_indices(len(matrix))] += 1.0
+        moved = _lu_solve(matrix, free[touched])
+        answer: FloatArray = free - compliance[:, touched] @ (stiffness @ moved)
+        return answer
 
 
 def _lu_solve(matrix: FloatArray, force: FloatArray) -> FloatArray:

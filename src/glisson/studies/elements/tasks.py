@@ -9,13 +9,13 @@ import numpy as np
 
 from glisson.core.arrays import FloatArray
 from glisson.core.deformation import Deformation
-from glisson.core.model import Material
+from glisson.core.model import Material, Model
 from glisson.core.scenario import ContactLaw, Move, Scenario, Stage
+from glisson.geometry.boxes import box_mesh
 from glisson.geometry.mapping import PointMap
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
 from glisson.studies.point import Outcome, Task
 from glisson.studies.store import read_arrays
-from glisson.verification.bodies import box_mesh, box_model
 
 SOLVE = Task(f"{__name__}:solve_block", ("glisson.core", "glisson.geometry", "glisson.mechanics", __name__))
 
@@ -79,7 +79,8 @@ def _solved(element: str, cubes: int, poisson_ratio: float) -> Deformation:
     mesh = box_mesh(SIZES, counts_of(cubes))
     x = mesh.nodes[:, 0]
     material = Material("neo-hookean", _YOUNG_MODULUS_KPA, poisson_ratio)
-    model = box_model(mesh, material, left=np.flatnonzero(x == 0.0), right=np.flatnonzero(x == SIZES[0]))
+    ends = {"left": np.flatnonzero(x == 0.0), "right": np.flatnonzero(x == SIZES[0])}
+    model = Model(mesh, {0: material}, {0: "block"}, ends)
     lift = Stage("lift", ContactLaw(), fixed=("left",), moves=(Move("right", _LIFT_MM),))
     scenario = Scenario((), (lift,), surgery_gravity=np.array([0.0, 0.0, -1.0]), rest_shape="as-scanned")
     return QuasiStatic(QuasiStaticParameters(element=element)).solve(model, scenario)
