@@ -3,8 +3,9 @@
 import numpy as np
 
 from glisson.core import Board, ContactLaw, Deformation, Lever, LeverDrive, Material, Model, Scenario, Stage
+from glisson.geometry.boxes import box_mesh
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
-from glisson.verification.bodies import box_mesh, box_model
+from glisson.verification.bodies import box_model
 
 DOWN = np.array([0.0, 0.0, -1.0])
 BOARD = Board("board", np.zeros(3), -DOWN)

@@ -6,10 +6,10 @@ import pytest
 from glisson.core import Lever, Material, TetMesh
 from glisson.core.mesh import TET_FACES
 from glisson.core.units import STANDARD_GRAVITY_MM_S2
+from glisson.geometry.boxes import box_mesh
 from glisson.phantom.calculix.deck import FACE_OPPOSITE_CORNER, Deck, Increments, PenaltyContact
 from glisson.phantom.calculix.lift_deck import LiftOrgan, LiftSettings, with_middles, write_lift_deck
 from glisson.phantom.calculix.results import calculix_program, read_frd, run_calculix
-from glisson.verification.bodies import box_mesh
 from glisson.verification.calculix_files import fields, read_displacements, read_t10
 from glisson.verification.closed_forms import uniaxial
 

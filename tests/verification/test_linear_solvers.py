@@ -6,11 +6,12 @@ from scipy.sparse import triu
 from scipy.sparse.linalg import spsolve
 
 from glisson.core import Material
+from glisson.geometry.boxes import box_mesh
 from glisson.mechanics.linear_solvers import make_direct_solver, make_iterative_solver
 from glisson.mechanics.linear_solvers.multigrid import Multigrid
 from glisson.mechanics.linear_solvers.superlu import SuperLU
 from glisson.mechanics.numbering import numbering
-from glisson.verification.bodies import body_of, box_mesh, distorted
+from glisson.verification.bodies import body_of, distorted
 
 MAKERS = {"direct": make_direct_solver, "superlu": SuperLU, "iterative": make_iterative_solver}
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from glisson.core import ContactLaw, Material, Move, Scenario, Stage, Status
+from glisson.geometry.boxes import box_mesh
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
-from glisson.verification.bodies import box_mesh, box_model
+from glisson.verification.bodies import box_model
 
 MATERIAL = Material("neo-hookean", 7.0, 0.0)
 FREE = ContactLaw()

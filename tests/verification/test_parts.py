@@ -21,11 +21,12 @@ from glisson.core import (
     Structures,
 )
 from glisson.core.mesh import TetMesh
+from glisson.geometry.boxes import box_mesh
 from glisson.geometry.mapping import PointMap
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
 from glisson.mechanics.self_contact import SelfContact
 from glisson.navigation.wire import Wire, carried_wire
-from glisson.verification.bodies import box_mesh, box_model
+from glisson.verification.bodies import box_model
 from glisson.verification.closed_forms import uniaxial
 
 SOFT = Material("neo-hookean", 7.0, 0.4)

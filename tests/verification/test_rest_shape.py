@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from glisson.core import Board, ContactLaw, Material, Scenario, Stage, Status
+from glisson.geometry.boxes import box_mesh
 from glisson.mechanics.body import Body
 from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.elements import surface_quadrature
@@ -10,7 +11,7 @@ from glisson.mechanics.newton import Newton, NewtonSettings
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
 from glisson.mechanics.rest_shape import find_rest_shape
 from glisson.mechanics.stages import fixed_unknowns, gravity_forces
-from glisson.verification.bodies import box_mesh, box_model
+from glisson.verification.bodies import box_model
 
 DOWN = np.array([0.0, 0.0, -1.0])
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from glisson.core import BadInput, Material
-from glisson.verification.bodies import body_of, box_mesh, equilibrium
+from glisson.geometry.boxes import box_mesh
+from glisson.verification.bodies import body_of, equilibrium
 from glisson.verification.check import PREFIXES, Case, Check, NoSolution, Unavailable, order_check, taylor_check
 from glisson.verification.suite import CASES, chosen_cases
 

@@ -20,9 +20,10 @@ from glisson.core import (
     TriangleSurface,
 )
 from glisson.core.units import STANDARD_GRAVITY_MM_S2
+from glisson.geometry.boxes import box_mesh
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
 from glisson.mechanics.tools import make_tool
-from glisson.verification.bodies import box_mesh, box_model
+from glisson.verification.bodies import box_model
 
 SIZES = np.array([60.0, 30.0, 15.0])
 MATERIAL = Material("neo-hookean", 20.0, 0.4)

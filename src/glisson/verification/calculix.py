@@ -15,10 +15,11 @@ from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.mesh import TetMesh
 from glisson.core.model import Material
 from glisson.core.scenario import ContactLaw
+from glisson.geometry.boxes import box_mesh
 from glisson.mechanics.contact_law import Cushion
 from glisson.phantom.calculix.deck import FACE_OPPOSITE_CORNER, Deck, Increments, PenaltyContact
 from glisson.phantom.calculix.results import NodalField, calculix_program, read_frd, run_calculix
-from glisson.verification.bodies import body_of, box_mesh, equilibrium, floor, reactions
+from glisson.verification.bodies import body_of, equilibrium, floor, reactions
 from glisson.verification.calculix_files import cards, fields, node_sets, read_displacements, read_t10
 from glisson.verification.check import Case, Check, NoSolution, Unavailable, relative, vanishing
 from glisson.verification.shared_data import shared_folder

@@ -12,10 +12,11 @@ from glisson.core.mesh import TetMesh
 from glisson.core.model import Material
 from glisson.core.scenario import ContactLaw
 from glisson.core.tools import Cylinder
+from glisson.geometry.boxes import box_mesh
 from glisson.mechanics.contact_law import Cushion
 from glisson.mechanics.cylinder import CylinderTool
 from glisson.mechanics.elements import surface_quadrature
-from glisson.verification.bodies import body_of, box_mesh, equilibrium, mapped, reactions
+from glisson.verification.bodies import body_of, equilibrium, mapped, reactions
 from glisson.verification.check import Case, Check, relative
 
 _NAME = "capstan/strip"

@@ -13,7 +13,8 @@ from scipy.optimize import brentq
 from glisson.core.arrays import FloatArray
 from glisson.core.mesh import TetMesh
 from glisson.core.model import Material
-from glisson.verification.bodies import body_of, box_mesh, distorted, equilibrium, material_of, reactions
+from glisson.geometry.boxes import box_mesh
+from glisson.verification.bodies import body_of, distorted, equilibrium, material_of, reactions
 from glisson.verification.check import Case, Check, relative
 
 _SIZES = (20.0, 10.0, 10.0)

@@ -7,8 +7,9 @@ import numpy as np
 from glisson.core.arrays import FloatArray
 from glisson.core.mesh import TetMesh
 from glisson.core.model import Material
+from glisson.geometry.boxes import box_mesh
 from glisson.mechanics.elements import surface_quadrature
-from glisson.verification.bodies import body_of, box_mesh, equilibrium, mapped
+from glisson.verification.bodies import body_of, equilibrium, mapped
 from glisson.verification.check import Case, Check, relative
 
 _LENGTH, _ROOT, _TIP, _RISE = 48.0, 44.0, 16.0, 44.0

@@ -3,8 +3,9 @@
 import numpy as np
 
 from glisson.core.model import Material
+from glisson.geometry.boxes import box_mesh
 from glisson.mechanics.elements import surface_quadrature
-from glisson.verification.bodies import body_of, box_mesh, equilibrium
+from glisson.verification.bodies import body_of, equilibrium
 from glisson.verification.check import Case, Check, relative
 
 _NAME = "elastica"

@@ -4,7 +4,8 @@ import numpy as np
 
 from glisson.core.model import Material
 from glisson.core.scenario import ContactLaw
-from glisson.verification.bodies import body_of, box_mesh, distorted, equilibrium, floor, reactions
+from glisson.geometry.boxes import box_mesh
+from glisson.verification.bodies import body_of, distorted, equilibrium, floor, reactions
 from glisson.verification.check import Case, Check, relative
 
 _NAME = "energy/press-and-pull"

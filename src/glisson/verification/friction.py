@@ -12,8 +12,9 @@ from glisson.core.scenario import ContactLaw, Scenario, Stage
 from glisson.core.status import Status
 from glisson.core.tools import Board
 from glisson.core.units import STANDARD_GRAVITY_MM_S2, density_from_kg_m3
+from glisson.geometry.boxes import box_mesh
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
-from glisson.verification.bodies import body_of, box_mesh, box_model, equilibrium, floor
+from glisson.verification.bodies import body_of, box_model, equilibrium, floor
 from glisson.verification.check import Case, Check, NoSolution, relative, vanishing
 
 BLOCK = Material("neo-hookean", 50.0, 0.3, 1150.0)

@@ -10,7 +10,8 @@ from scipy.integrate import quad
 
 from glisson.core.arrays import FloatArray
 from glisson.core.model import Material
-from glisson.verification.bodies import body_of, box_mesh, equilibrium, mapped, reactions
+from glisson.geometry.boxes import box_mesh
+from glisson.verification.bodies import body_of, equilibrium, mapped, reactions
 from glisson.verification.check import Case, Check, relative
 
 _NAME = "closed-form/inflation"

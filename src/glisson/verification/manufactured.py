@@ -14,8 +14,9 @@ from scipy.special import roots_jacobi
 from glisson.core.arrays import FloatArray
 from glisson.core.mesh import TetMesh
 from glisson.core.model import Material
+from glisson.geometry.boxes import box_mesh
 from glisson.geometry.shape_functions import shape_slopes, shape_values
-from glisson.verification.bodies import body_of, box_mesh, equilibrium, mapped
+from glisson.verification.bodies import body_of, equilibrium, mapped
 from glisson.verification.check import Case, Check, order_check
 
 _SIDE = 10.0  # of the cube, mm

@@ -9,10 +9,11 @@ from scipy.spatial.transform import Rotation
 
 from glisson.core.mesh import TetMesh
 from glisson.core.model import Capsule, Material
+from glisson.geometry.boxes import box_mesh
 from glisson.mechanics.elastic_attachments import ElasticAttachments
 from glisson.mechanics.gas_pressure import GasPressure
 from glisson.mechanics.membrane import Membrane
-from glisson.verification.bodies import body_of, box_mesh, box_model, distorted, equilibrium
+from glisson.verification.bodies import body_of, box_model, distorted, equilibrium
 from glisson.verification.check import Case, Check, relative, vanishing
 from glisson.verification.meshes import ball
 

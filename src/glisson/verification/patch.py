@@ -4,7 +4,8 @@ from functools import partial
 
 import numpy as np
 
-from glisson.verification.bodies import LAWS, body_of, box_mesh, distorted, equilibrium, material_of
+from glisson.geometry.boxes import box_mesh
+from glisson.verification.bodies import LAWS, body_of, distorted, equilibrium, material_of
 from glisson.verification.check import Case, Check, vanishing
 
 _SIZES = (30.0, 20.0, 10.0)

@@ -5,9 +5,10 @@ from functools import partial
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from glisson.geometry.boxes import box_mesh
 from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.materials.law import find_law
-from glisson.verification.bodies import FRAME_INDIFFERENT, box_mesh, distorted, material_of
+from glisson.verification.bodies import FRAME_INDIFFERENT, distorted, material_of
 from glisson.verification.check import Case, Check, vanishing
 
 _TURNS = Rotation.from_rotvec(

@@ -9,8 +9,9 @@ from glisson.core.mesh import TetMesh
 from glisson.core.model import Material, Rod
 from glisson.core.structures import Curve
 from glisson.core.units import newtons_from_millinewtons
+from glisson.geometry.boxes import box_mesh
 from glisson.mechanics.sliding_rod import SlidingRod
-from glisson.verification.bodies import body_of, box_mesh, equilibrium
+from glisson.verification.bodies import body_of, equilibrium
 from glisson.verification.check import Case, Check, relative
 
 _LENGTH, _THICKNESS = 120.0, 4.0

@@ -12,6 +12,7 @@ from glisson.core.model import Capsule, Material, Rod
 from glisson.core.scenario import ContactLaw
 from glisson.core.structures import Curve
 from glisson.core.tools import Board, Cylinder, Lever, MeshTool, Slot
+from glisson.geometry.boxes import box_mesh
 from glisson.mechanics.body import Body
 from glisson.mechanics.contact import Touch
 from glisson.mechanics.contact_law import Cushion, shear_share, shear_slope, slip_energy
@@ -25,16 +26,7 @@ from glisson.mechanics.parts import Part
 from glisson.mechanics.pattern import block_pattern
 from glisson.mechanics.sliding_rod import SlidingRod
 from glisson.mechanics.tools import RigidTool, make_tool
-from glisson.verification.bodies import (
-    FRAME_INDIFFERENT,
-    LAWS,
-    body_of,
-    box_mesh,
-    distorted,
-    floor,
-    mapped,
-    material_of,
-)
+from glisson.verification.bodies import FRAME_INDIFFERENT, LAWS, body_of, distorted, floor, mapped, material_of
 from glisson.verification.check import Case, Check, NoSolution, taylor_check, vanishing
 
 
