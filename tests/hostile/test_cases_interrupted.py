@@ -157,7 +157,7 @@ def test_a_real_interruption_ends_a_mesh_at_once(tmp_path: Path, signalled: sign
         running.send_signal(signalled)
     out, err = running.communicate(timeout=30)
     assert time.monotonic() - interrupted < 10.0
-    assert running.returncode == 130
+    assert running.returncode == 130, out + err
     assert "Interrupted in the stage mesh" in json.loads(out)["message"]
     assert "Traceback" not in err
     assert contents(case.folder) == before

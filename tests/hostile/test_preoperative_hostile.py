@@ -200,7 +200,7 @@ def test_settings_without_a_liver_and_a_model_without_a_back():
     with pytest.raises(BadInput, match="needs a material for 'liver'"):
         ModelSettings({"tumours": HUMAN_LIVER})
     mesh = TetMesh([[0, 0, 0], [30, 0, 0], [0, 30, 0], [0, 0, 30]], [[0, 1, 2, 3]])
-    with pytest.raises(BadInput, match="no node set 'back'"):
+    with pytest.raises(BadInput, match="Nothing holds the organ"):
         propose_scenario(Model(mesh, {0: HUMAN_LIVER}, {0: "liver"}, {}))
     with pytest.raises(BadInput, match="offers no underside"):
         propose_scenario(Model(mesh, {0: HUMAN_LIVER}, {0: "liver"}, {"back": np.array([0, 1, 2])}))

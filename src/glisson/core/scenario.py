@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from glisson.core.arrays import FloatArray, unit_vector
 from glisson.core.errors import BadInput
@@ -81,6 +80,8 @@ class ToolMotion:
 
     def pose(self, share: float) -> RigidTransform:
         """Where a share of the motion takes points of the patient's frame."""
+        from scipy.spatial.transform import Rotation  # slow to load, and `--help` needs this module
+
         about = np.zeros(3) if self.about_mm is None else np.array(self.about_mm)
         turn = Rotation.from_rotvec(share * np.radians(self.turn_deg)).as_matrix()
         return RigidTransform("patient", "patient", turn, about - turn @ about + share * np.array(self.displacement_mm))
