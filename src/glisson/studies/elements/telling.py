@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from matplotlib.ticker import NullFormatter, StrMethodFormatter
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from glisson.navigation.figures.colours import BLUE, ORANGE
 from glisson.navigation.figures.picture import Picture, new_figure, picture
@@ -41,8 +41,9 @@ def draw_errors(rows: Sequence[Mapping[str, Any]]) -> Picture:
             for row, time, error in zip(shown, times, errors, strict=True):
                 axes.annotate(f"{row['elements']:,}", (time, error), (4, 4), textcoords="offset points", fontsize=9)
         axes.set(xscale="log", yscale="log", title=f"ν = {ratio:g}")
-        axes.margins(x=0.15)
+        axes.margins(x=0.2)
         for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             axis.set_major_formatter(StrMethodFormatter("{x:g}"))
             axis.set_minor_formatter(NullFormatter())
         axes.set_xlabel("seconds of the solve", fontsize=11.5)
