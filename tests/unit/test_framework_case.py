@@ -92,16 +92,22 @@ def test_the_lock_of_a_killed_run_is_taken_over(case: Case) -> None:
         assert (case.folder / LOCK).read_text() == str(os.getpid())
 
 
-def test_an_interruption_that_is_held_comes_at_the_end() -> None:
+@pytest.mark.parametrize("signalled", [signal.SIGINT, signal.SIGTERM])
+def test_an_interruption_that_is_held_comes_at_the_end(signalled: signal.Signals) -> None:
+    """As the command line has it, where both signals are an interruption."""
+    before = signal.signal(signalled, signal.default_int_handler)
     done = []
 
     def interrupted() -> None:
         with interruptions_held():
-            os.kill(os.getpid(), signal.SIGINT)
+            os.kill(os.getpid(), signalled)
             sum(range(100_000))
             done.append("all of it")
 
-    with pytest.raises(KeyboardInterrupt):
-        interrupted()
-    assert done
-    assert signal.getsignal(signal.SIGINT) is not signal.SIG_DFL
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            interrupted()
+        assert done
+        assert signal.getsignal(signalled) is signal.default_int_handler
+    finally:
+        signal.signal(signalled, before)

@@ -9,12 +9,12 @@ from types import FrameType
 
 @contextmanager
 def interruptions_held() -> Iterator[None]:
-    """Ctrl-C during the block comes at its end; a process that starts meanwhile never sees one.
+    """Ctrl-C and SIGTERM during the block come at its end; a process that starts meanwhile never sees a Ctrl-C.
 
     Some libraries take an interruption while they are loaded for a part that is missing, and go on.
 
     Raises:
-        KeyboardInterrupt: at the end, when there was one.
+        KeyboardInterrupt: at the end, when there was one and it is not dealt with otherwise.
     """
     if threading.current_thread() is not threading.main_thread():  # only that one is ever interrupted
         yield
@@ -25,12 +25,13 @@ def interruptions_held() -> Iterator[None]:
         held.append(number)
 
     # Signals reach whichever thread takes them, so a mask alone would not do; new processes inherit the mask.
-    handler = signal.signal(signal.SIGINT, hold)
+    handlers = {number: signal.signal(number, hold) for number in (signal.SIGINT, signal.SIGTERM)}
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        signal.signal(signal.SIGINT, handler)
-    if held and handler is not signal.SIG_IGN:
-        raise KeyboardInterrupt
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+    for number in held[:1]:
+        signal.raise_signal(number)
