@@ -25,13 +25,14 @@ def interruptions_held() -> Iterator[None]:
         held.append(number)
 
     # Signals reach whichever thread takes them, so a mask alone would not do; new processes inherit the mask.
-    handlers = {number: signal.signal(number, hold) for number in (signal.SIGINT, signal.SIGTERM)}
+    kinds = (signal.SIGINT, signal.SIGTERM)
+    handlers = [signal.signal(kind, hold) for kind in kinds]
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
-    for number in held[:1]:
-        signal.raise_signal(number)
+        for kind, handler in zip(kinds, handlers, strict=True):
+            signal.signal(kind, handler)
+    if held:
+        signal.raise_signal(held[0])
