@@ -22,11 +22,11 @@ from glisson.core import (
     VesselTree,
 )
 from glisson.geometry.planes import angle_between_deg
+from glisson.geometry.wire import Wire
 from glisson.navigation.guidance import navigate
 from glisson.navigation.plan import Plan
 from glisson.navigation.results import as_results
 from glisson.navigation.volumes import label_parts, organ_volume_mm3, removed_volume_mm3
-from glisson.navigation.wire import Wire
 
 SIZE = (100.0, 40.0, 20.0)
 CENTRE, RADIUS = np.array([70.0, 20.0, 10.0]), 6.0

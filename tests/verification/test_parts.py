@@ -23,9 +23,10 @@ from glisson.core import (
 from glisson.core.mesh import TetMesh
 from glisson.geometry.boxes import box_mesh
 from glisson.geometry.mapping import PointMap
+from glisson.geometry.wire import Wire
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
 from glisson.mechanics.self_contact import SelfContact
-from glisson.navigation.wire import Wire, carried_wire
+from glisson.navigation.wire import carried_wire
 from glisson.verification.bodies import box_model
 from glisson.verification.closed_forms import uniaxial
 

@@ -75,16 +75,20 @@ class PointLocator:
         Outside the mesh the field goes on linearly (first Taylor term at the nearest place inside), since
         quadratic shape functions run away there.
         """
+        local = nodal[self.mesh.tetrahedra[location.elements]]
+        values: FloatArray = np.einsum("na,nak->nk", self.weights(location), local)
+        return values
+
+    def weights(self, location: Location) -> FloatArray:
+        """How much (n, 4 or 10) each node of its element counts in the value at a located point; see `interpolate`."""
         quadratic = self.mesh.is_quadratic
         nearest = _clamped(location.coordinates)
-        local = nodal[self.mesh.tetrahedra[location.elements]]
-        values: FloatArray = np.einsum("na,nak->nk", shape_values(nearest, quadratic), local)
+        weights = shape_values(nearest, quadratic)
         out = np.flatnonzero(location.coordinates.min(axis=1) < 0.0)
         if len(out):
             beyond = location.coordinates[out] - nearest[out]
-            slopes = shape_slopes(nearest[out], quadratic)
-            values[out] += np.einsum("nai,ni,nak->nk", slopes, beyond, local[out])
-        return values
+            weights[out] += np.einsum("nai,ni->na", shape_slopes(nearest[out], quadratic), beyond)
+        return weights
 
     def _extrapolate(
         self, points: FloatArray, outside: IntArray, elements: IntArray, coordinates: FloatArray, distance: FloatArray

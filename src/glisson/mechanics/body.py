@@ -202,6 +202,11 @@ class Body:
         acting = sum(part.energy(positions) for part in self.parts)
         return elastic + touching + dragging + acting - float(np.vdot(self.external, positions - self.elasticity.rest))
 
+    def is_possible(self, positions: FloatArray) -> bool:
+        """Whether no element is inverted, and no part forbids it (a surface that cuts itself)."""
+        energies = (self.elasticity.energy(positions), *(part.energy(positions) for part in self.parts))
+        return bool(np.isfinite(energies).all())
+
     def balance(self, positions: FloatArray, touches: Sequence[Touch]) -> Balance:
         """All nodal forces and what is left of them on the free unknowns."""
         internal = -self.elasticity.forces(positions)

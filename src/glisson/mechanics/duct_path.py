@@ -7,6 +7,7 @@ from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.mesh import TetMesh
 from glisson.core.structures import Curve
 from glisson.geometry.location import PointLocator
+from glisson.geometry.wire import Wire
 
 _KNOT_MM = 6.0  # between the material points that carry the curve; voxel steps of a traced duct are much shorter
 _DEGREE = 3
@@ -24,21 +25,17 @@ class DuctPath:
     """
 
     def __init__(self, mesh: TetMesh, duct: Curve, length_mm: float) -> None:
-        arcs, rows = duct.arc_lengths_mm, duct.points_mm
         self.length_mm = max(float(length_mm), duct.length_mm)
         count = max(round(self.length_mm / _KNOT_MM), _DEGREE) + 1
         knots = np.linspace(0.0, self.length_mm, count)
-        points = np.stack([np.interp(knots, arcs, rows[:, axis]) for axis in range(3)], axis=1)
-        if self.length_mm > duct.length_mm:
-            inward = rows[-1] - rows[-2]
-            points += np.maximum(knots - duct.length_mm, 0.0)[:, None] * inward / np.linalg.norm(inward)
+        points = Wire(duct.points_mm, self.length_mm).at(knots)
         locator = PointLocator(mesh)
         location = locator.locate(points)
-        self.nodes: IntArray = np.unique(mesh.tetrahedra[location.elements])
+        hosts = mesh.tetrahedra[location.elements]
+        self.nodes: IntArray = np.unique(hosts)
         """Nodes (a,) on which the curve depends."""
-        chosen = np.zeros((len(mesh.nodes), len(self.nodes)))
-        chosen[self.nodes, np.arange(len(self.nodes))] = 1.0
-        carried = locator.interpolate(location, chosen)
+        carried = np.zeros((count, len(self.nodes)))
+        np.put_along_axis(carried, np.searchsorted(self.nodes, hosts), locator.weights(location), axis=1)
         # Exact in A for points outside the mesh as well.
         self._constant = points - carried @ mesh.nodes[self.nodes]
         self._carried = carried

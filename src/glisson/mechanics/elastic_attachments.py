@@ -1,7 +1,5 @@
 """Ligaments that give way: springs spread over a part of the surface."""
 
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,19 +15,18 @@ class ElasticAttachments(Memoryless):
     What they bear in A, where the organ hangs on them, they go on bearing; see `settle`.
 
     Args:
-        model: its mesh and node sets.
-        stiffness_kpa_mm: node set → traction per displacement.
+        model: its mesh, node sets and ligaments.
     """
 
-    def __init__(self, model: Model, stiffness_kpa_mm: Mapping[str, float]) -> None:
+    def __init__(self, model: Model) -> None:
         self._scanned = model.mesh.nodes
         faces = face_nodes(model.mesh)
         corners = model.mesh.nodes[faces[:, :3]]
         crossed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        springs = np.zeros(len(faces))
-        for name, stiffness in stiffness_kpa_mm.items():
-            within = _within(faces, model.node_set(name), len(model.mesh.nodes))
-            springs += 0.5 * stiffness * np.linalg.norm(crossed, axis=1) * within
+        stiffness = np.zeros(len(faces))
+        for name, value in model.ligaments.items():
+            stiffness += value * _within(faces, model.node_set(name), len(model.mesh.nodes))
+        springs = 0.5 * stiffness * np.linalg.norm(crossed, axis=1)
         self._faces = faces[springs > 0.0]
         points, weights = exact_rule()
         values = face_values(points, model.mesh.is_quadratic)

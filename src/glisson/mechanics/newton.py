@@ -253,7 +253,7 @@ class Newton:
         body.add_friction_by_pressure(positions, touches, blocks)
         step = solve_near_symmetric(body.tangent(positions, blocks), self._solver, balance.unbalanced, accuracy)
         moved = positions + step
-        if not np.isfinite(body.energy(moved)):
+        if not body.is_possible(moved):
             return None
         found = body.balance(moved, body.touches(moved))
         if found.residual < _COUPLED_GAIN * balance.residual:

@@ -114,10 +114,10 @@ class QuasiStatic:
         settle_gaps(contacts, surface.positions(mesh.nodes), rest.supports, parameters.surface_tolerance_mm)
         elasticity = Elasticity(mesh, model.materials, rest.positions)
         fixed = fixed_unknowns(model, scenario.stages[0].fixed)
-        ligaments = ElasticAttachments(model, model.ligaments)
+        ligaments = [ElasticAttachments(model)] if model.ligaments else []
         gas = GasPressure(mesh) if any(stage.gas_pressure_kpa for stage in scenario.stages) else None
         parts: list[Part] = [] if model.capsule is None else [Membrane(mesh, model.capsule)]
-        parts += [ligaments] if model.ligaments else []
+        parts += ligaments
         parts += [] if rod is None else [rod]
         parts += [Ties(model, model.ties)] if model.ties else []
         if parameters.self_contact:
@@ -125,7 +125,8 @@ class QuasiStatic:
         body = Body(elasticity, surface, contacts, fixed, parts, gas)
         if scenario.rest_shape == "from-gravity":
             body.external = gravity_forces(model, scenario.scan_gravity)
-            ligaments.settle(body.balance(mesh.nodes, body.touches(mesh.nodes)).unbalanced)
+            for part in ligaments:
+                part.settle(body.balance(mesh.nodes, body.touches(mesh.nodes, update_friction=False)).unbalanced)
         return body
 
     def _rest_shape(

@@ -1,6 +1,7 @@
 """The organ's contact with itself, by the barrier of the IPC Toolkit (Li et al. 2020, Incremental Potential Contact).
 
-Without friction. A state in which the surface cuts itself has infinite energy, so that no line search takes it.
+Without friction. A state in which the surface cuts itself has infinite energy, so that no line search takes it. The way
+to a state is not looked at: a part thinner than a step could pass through another one within it.
 """
 
 from importlib.util import find_spec
@@ -14,7 +15,7 @@ from glisson.core.mesh import TetMesh
 from glisson.mechanics.faces import face_nodes
 from glisson.mechanics.parts import Memoryless
 
-_STIFFNESS_KPA = 200.0  # of the barrier; see the design's notes on its scale
+_STIFFNESS_KPA = 200.0  # of the barrier, far above the pressure of an organ's weight (0.5 kPa)
 _STIFFNESS_MODULI = 3.0
 _QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])  # of a face with six nodes
 

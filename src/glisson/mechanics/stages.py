@@ -205,7 +205,7 @@ class StageRunner:
         """
         step, share = moved - self._positions, 1.0
         while share > _SMALLEST_ANSWER:
-            if np.isfinite(self._body.energy(self._positions + share * step)):
+            if self._body.is_possible(self._positions + share * step):
                 return self._positions + share * step
             if step[self._body.fixed].any():
                 return None

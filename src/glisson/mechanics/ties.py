@@ -12,7 +12,6 @@ from glisson.core.errors import BadInput
 from glisson.core.mesh import TetMesh
 from glisson.core.model import Model
 from glisson.geometry.location import PointLocator
-from glisson.geometry.shape_functions import shape_values
 
 _FARTHEST_MM = 1.0  # from the other part
 _STIFFNESS_MODULI = 50.0  # of the spring that helps the multipliers, over the modulus times the tied nodes' spacing
@@ -91,7 +90,5 @@ def _tied(mesh: TetMesh, name: str, nodes: IntArray) -> tuple[IntArray, FloatArr
     farthest = float(location.distance_mm.max())
     if farthest > _FARTHEST_MM:
         raise BadInput(f"The node set {name!r} lies up to {farthest:.1f} mm away from the part it should be tied to.")
-    values = shape_values(np.clip(location.coordinates, 0.0, None), mesh.is_quadratic)
     hosts = mesh.tetrahedra[others[location.elements]]
-    values /= values.sum(axis=1, keepdims=True)
-    return np.column_stack([nodes, hosts]), np.column_stack([np.ones(len(nodes)), -values])
+    return np.column_stack([nodes, hosts]), np.column_stack([np.ones(len(nodes)), -locator.weights(location)])

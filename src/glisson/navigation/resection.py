@@ -9,7 +9,7 @@ from glisson.core.mesh import TriangleSurface
 from glisson.core.structures import Plane
 from glisson.geometry.mapping import PointMap
 from glisson.geometry.planes import fit_plane, plane_basis
-from glisson.navigation.wire import Wire
+from glisson.geometry.wire import Wire
 
 FAR_MM = 20.0
 """A wire that stays farther than this from the tumour is worth a sentence."""

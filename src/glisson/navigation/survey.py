@@ -8,10 +8,11 @@ from glisson.core.errors import BadInput
 from glisson.core.mesh import TriangleSurface
 from glisson.core.structures import Plane, Structures, Tumour
 from glisson.geometry.mapping import PointMap
+from glisson.geometry.wire import Wire
 from glisson.navigation.plan import Plan
 from glisson.navigation.resection import CarriedPlane, carry_plane, rule_plane
 from glisson.navigation.volumes import organ_volume_mm3, removed_fraction
-from glisson.navigation.wire import Wire, carried_wire
+from glisson.navigation.wire import carried_wire
 
 _OUTSIDE_MM = 5.0
 

@@ -11,12 +11,12 @@ from glisson.core.mesh import TET_EDGES, TetMesh
 Lengths = Sequence[float] | FloatArray
 
 _BETWEEN = {frozenset((int(a), int(b))): 4 + n for n, (a, b) in enumerate(TET_EDGES)}  # T10's middle nodes
-_OPPOSITE = [(_BETWEEN[frozenset((0, 1))], _BETWEEN[frozenset((2, 3))])]  # the diagonal of the inner octahedron
+_DIAGONAL = (_BETWEEN[frozenset((0, 1))], _BETWEEN[frozenset((2, 3))])  # the diagonal of the inner octahedron
 _RING = [_BETWEEN[frozenset(ends)] for ends in ((0, 2), (1, 2), (1, 3), (0, 3))]
 _EIGHTHS = np.array(
     [
         *([c, *(_BETWEEN[frozenset((c, other))] for other in range(4) if other != c)] for c in range(4)),
-        *([*_OPPOSITE[0], _RING[n], _RING[(n + 1) % 4]] for n in range(4)),
+        *([*_DIAGONAL, _RING[n], _RING[(n + 1) % 4]] for n in range(4)),
     ]
 )
 

@@ -1,5 +1,6 @@
 """What acts on an organ beside its tissue and tools: capsule, gas, and ligaments that give way."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -41,11 +42,8 @@ def _balloon(name: str) -> list[Check]:
     mesh = ball(_RADIUS, 2)
     skin_kpa = _CAPSULE.young_modulus_kpa / 3.0
     pressure = 2.0 * _CAPSULE.thickness_mm / _RADIUS * skin_kpa * (_STRETCH**-1 - _STRETCH**-7)
-    centre = int(np.linalg.norm(mesh.nodes, axis=1).argmin())
-    fixed = np.zeros(mesh.nodes.shape, dtype=bool)
-    fixed[centre] = True
-    for node, axes in ((int(mesh.nodes[:, 0].argmax()), [1, 2]), (int(mesh.nodes[:, 1].argmax()), [2])):
-        fixed[node, axes] = True
+    centre = np.linalg.norm(mesh.nodes, axis=1).argmin()
+    fixed = _held(mesh, int(centre), int(mesh.nodes[:, 0].argmax()), int(mesh.nodes[:, 1].argmax()))
     gas = GasPressure(mesh)
     body = body_of(mesh, _FAINT, fixed, parts=[Membrane(mesh, _CAPSULE)], gas=gas)
     positions = np.array(mesh.nodes)
@@ -105,8 +103,9 @@ def _bedded(name: str) -> list[Check]:
     """A stiff block on ligaments sinks by F / (k A) and tilts by M / (k I) under an eccentric load."""
     mesh = box_mesh(_SIZES, (4, 3, 1), quadratic=True)
     low = np.flatnonzero(mesh.nodes[:, 2] < 1e-9)
-    model = box_model(mesh, Material("linear-elastic", 1e7, 0.3), ligaments=low)
-    body = body_of(mesh, model.materials[0], parts=[ElasticAttachments(model, {"ligaments": _LIGAMENT_KPA_MM})])
+    plain = box_model(mesh, Material("linear-elastic", 1e7, 0.3), under=low)
+    model = replace(plain, ligaments={"under": _LIGAMENT_KPA_MM})
+    body = body_of(mesh, model.materials[0], parts=[ElasticAttachments(model)])
     force = 500.0  # mN down at a corner's middle of the upper edge x = 40
     body.external = np.zeros_like(mesh.nodes)
     edge = np.linalg.norm(mesh.nodes - [_SIZES[0], 0.5 * _SIZES[1], _SIZES[2]], axis=1).argmin()

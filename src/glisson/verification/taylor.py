@@ -221,7 +221,7 @@ def _tool(name: str, tool: RigidTool) -> list[Check]:
 
 def _wedge() -> TriangleSurface:
     """A box whose upper side slopes."""
-    mesh = mapped(box_mesh((50.0, 20.0, 10.0), (1, 1, 1)), lambda p: p * [1.0, 1.0, 1.0] + 0.1 * p[:, :1] * [0, 0, 1])
+    mesh = mapped(box_mesh((50.0, 20.0, 10.0), (1, 1, 1)), lambda p: p + 0.1 * p[:, :1] * [0, 0, 1])
     return TriangleSurface(mesh.nodes - [0.0, 10.0, 5.0], mesh.boundary()[0])
 
 

@@ -14,10 +14,11 @@ from glisson.core.tools import Board, Cylinder, Lever, MeshTool, Slot
 from glisson.geometry.mapping import PointMap
 from glisson.geometry.planes import plane_basis
 from glisson.geometry.quadratic import boundary_surface
+from glisson.geometry.wire import Wire
 from glisson.navigation.figures.colours import LEVER, LIVER, TUMOUR, WIRE, Rgb, kind_of, structure_colour
 from glisson.navigation.rendering.bodies import Body, Palette
 from glisson.navigation.rendering.shapes import lever_bar, patch, tree_tubes, tube
-from glisson.navigation.wire import Wire, carried_wire
+from glisson.navigation.wire import carried_wire
 
 _WIRE_RADIUS_MM = 1.4
 _SQUARE_MM = 25.4
