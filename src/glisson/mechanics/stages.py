@@ -25,7 +25,7 @@ from glisson.mechanics.sliding_rod import SlidingRod
 
 _SMALLEST_SHARE = 1.0 / 256.0  # of a stage: smaller load steps are not tried
 _SMALLEST_ANSWER = 1.0 / 16.0
-_LOAD_STEPS = 4  # for a change of gravity or of the gas pressure, and for a node set that is carried
+_LOAD_STEPS = 4  # for a change of gravity, gas pressure or contact law, and for a node set that is carried
 _FIRST_SHARE = 0.1  # of a full load step, for the first one: the tool only just comes to bear
 _GROWTH = 2.0
 _STIFFENINGS = 6
@@ -114,7 +114,9 @@ class StageRunner:
         heavier = np.linalg.norm(goal.external - start.external) > 1e-9 * np.linalg.norm(goal.external)
         carrying = bool(np.any(goal.carried != start.carried))
         inflating = goal.gas_pressure_kpa != start.gas_pressure_kpa
-        if heavier or carrying or inflating:
+        # Where an organ comes to rest that begins to slip depends on the way there, even where nothing is moved.
+        slipping = goal.tools.law != start.tools.law
+        if heavier or carrying or inflating or slipping:
             steps = max(steps, _LOAD_STEPS)
         done, share, may_flow = 0.0, _FIRST_SHARE / steps if turn > 0.0 else 1.0 / steps, not carrying
         while done < 1.0:
