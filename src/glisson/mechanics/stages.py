@@ -115,8 +115,8 @@ class StageRunner:
         carrying = bool(np.any(goal.carried != start.carried))
         inflating = goal.gas_pressure_kpa != start.gas_pressure_kpa
         # Where an organ comes to rest that begins to slip depends on the way there, even where nothing is moved.
-        slipping = goal.tools.law != start.tools.law
-        if heavier or carrying or inflating or slipping:
+        regripping = goal.tools.law != start.tools.law
+        if heavier or carrying or inflating or regripping:
             steps = max(steps, _LOAD_STEPS)
         done, share, may_flow = 0.0, _FIRST_SHARE / steps if turn > 0.0 else 1.0 / steps, not carrying
         while done < 1.0:
