@@ -11,9 +11,9 @@ from glisson.core import BadInput, ContactLaw, Lever, LeverDrive, Scenario, Stag
 from glisson.mechanics import quasi_static
 from glisson.mechanics.body import LoadState
 from glisson.mechanics.contact_law import Cushion
+from glisson.mechanics.load_path import LoadPath
 from glisson.mechanics.newton import NewtonEnd
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
-from glisson.mechanics.stages import StageRunner
 
 
 @pytest.mark.parametrize("young_modulus_kpa", [700.0, 70.0, 12.0, 6.0, 3.0])
@@ -85,15 +85,15 @@ def test_an_organ_that_flows_ends_where_it_would_have_gone_at_once(monkeypatch: 
     scenario = Scenario((BOARD, WIDE), stages, DOWN, DOWN, ("board",))
     solver = QuasiStatic(QuasiStaticParameters())
     at_once = solver.solve(slab(7.0, (6, 2, 2)), scenario)
-    load_step, flowed = StageRunner._load_step, []
+    load_step, flowed = LoadPath.load_step, []
 
-    def failing(runner: StageRunner, goal: LoadState) -> NewtonEnd:
-        if goal.tools.law.cohesion_kpa == 0.0 < runner._body.law.cohesion_kpa:
+    def failing(path: LoadPath, goal: LoadState) -> NewtonEnd:
+        if goal.tools.law.cohesion_kpa == 0.0 < path.body.law.cohesion_kpa:
             flowed.append(goal)
-            return NewtonEnd(runner._positions, Status.ITERATION_LIMIT, 0, 1.0)
-        return load_step(runner, goal)
+            return NewtonEnd(path.positions, Status.ITERATION_LIMIT, 0, 1.0)
+        return load_step(path, goal)
 
-    monkeypatch.setattr(StageRunner, "_load_step", failing)
+    monkeypatch.setattr(LoadPath, "load_step", failing)
     slowly = solver.solve(slab(7.0, (6, 2, 2)), scenario)
     assert flowed
     assert slowly.status is Status.CONVERGED

@@ -7,10 +7,10 @@ from glisson.mechanics.body import Body
 from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.elements import surface_quadrature
 from glisson.mechanics.linear_solvers import make_direct_solver
+from glisson.mechanics.loads import fixed_unknowns, gravity_forces
 from glisson.mechanics.newton import Newton, NewtonSettings
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
 from glisson.mechanics.rest_shape import find_rest_shape
-from glisson.mechanics.stages import fixed_unknowns, gravity_forces
 from glisson.verification.bodies import box_model
 
 DOWN = np.array([0.0, 0.0, -1.0])

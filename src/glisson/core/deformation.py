@@ -92,6 +92,8 @@ class Deformation:
 
     `message` is one sentence, more exact than the status (it names a free direction, for example).
     Stages that were not reached are missing; the last one present may have a status that is not good.
+    `estimated_error` (n,) in mm is what a technique that leaves something out says it costs at each node, at the end of
+    the last stage; None where nothing is left out.
     """
 
     mesh: TetMesh
@@ -100,11 +102,15 @@ class Deformation:
     message: str
     record: tuple[LoadStep, ...] = ()
     events: tuple[Event, ...] = field(default=())
+    estimated_error: FloatArray | None = None
 
     def __post_init__(self) -> None:
         for stage in self.stages:
             if len(stage.displacement) != len(self.mesh.nodes):
                 raise BadInput(f"Stage {stage.name!r} has displacements for another mesh.")
+        if self.estimated_error is not None:
+            error = frozen_floats(self.estimated_error, (len(self.mesh.nodes),), "estimated error")
+            object.__setattr__(self, "estimated_error", error)
 
     @property
     def displacement(self) -> FloatArray:

@@ -146,6 +146,10 @@ class Body:
         self.carried = np.zeros_like(self.elasticity.rest)
         self.system = FreeSystem(self._pattern, fixed)
 
+    def contact_number(self, tool: str) -> int:
+        """The number of the contact with a tool of that name."""
+        return next(n for n, contact in enumerate(self.contacts) if contact.tool.name == tool)
+
     @property
     def loading(self) -> LoadState:
         """The present tools and loads."""

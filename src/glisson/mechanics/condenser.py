@@ -53,11 +53,14 @@ class Condenser:
         touches: Sequence[Touch],
         balance: Balance,
         change: FloatArray,
+        carried: FloatArray,
         goal: ToolState,
         tolerance: float,
         exact: bool,
     ) -> CondensedStep | None:
         """The step under what is unbalanced and a `change` (n, 3) of loads, the tools going to their goal.
+
+        What is carried goes by `carried` (n, 3), which is not in the step; its pull is part of the change.
 
         Friction's memory in the body becomes that at the goal. None where contact can't be settled. Unless
         `exact`, the organ's stiffness may be that of an earlier call, which spares a factorisation.
@@ -67,6 +70,7 @@ class Condenser:
         free = body.system.free
         others = balance.unbalanced - np.where(body.fixed, 0.0, body.contact_forces(positions, touches, body.moving))
         points = body.surface.positions(positions)[patch.points]
+        drift = body.surface.positions(carried)[patch.points]
         if exact or self._spring is None:
             self._spring = self._condensed(condensation, positions, touches)
         spring = self._spring
@@ -78,9 +82,8 @@ class Condenser:
         near = balance.residual <= _NEAR and start == goal and not new.any()
         for candidate in spring.candidates(near):
             parts = [body.contacts[number].part(patch.points) for number in body.moving]
-            settled = LocalContact(parts, patch, points, candidate, load, new, balance.scale).settle(
-                start, goal, tolerance
-            )
+            contact = LocalContact(parts, patch, points, drift, candidate, load, new, balance.scale)
+            settled = contact.settle(start, goal, tolerance)
             if settled is None:
                 continue
             for number, part in zip(body.moving, parts, strict=True):

@@ -8,7 +8,7 @@ everywhere: a tool may move millimetres in one step, and Newton's method pulls t
 
 Tangential direction: |τ| ≤ friction · p, and cohesion more where the surface coheres: cohesion is shear
 only and needs touch. This jump is no function that Newton's method could follow (it would cycle), so who
-coheres is decided between its solutions; see `StageRunner`.
+coheres is decided between its solutions; see `LoadPath`.
 A point sticks to its anchor on the tool like a stiff spring until the limit is reached over `stick_mm` of
 slip (the C1 law of Li et al., Incremental Potential Contact, 2020, section 5). Anchors stay over load
 steps and are dragged only as far as the point really slipped; a held body therefore does not creep.

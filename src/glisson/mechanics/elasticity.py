@@ -46,7 +46,7 @@ class Elasticity:
     """
 
     def __init__(self, mesh: TetMesh, materials: Mapping[int, Material], rest: FloatArray) -> None:
-        self.mesh = mesh
+        self.mesh, self.materials = mesh, materials
         self.rest = rest
         self.stiffest_kpa = max(material.young_modulus_kpa for material in materials.values())
         self._quadrature = quadrature(rest, mesh)

@@ -54,6 +54,7 @@ class LocalContact:
         contacts: the tools over the patch's points, with their states; they are changed.
         patch: the patch.
         points_mm: the points (p, 3) before the patch moves.
+        drift_mm: how far (p, 3) what is carried moves them in this step, in even measure with the tools.
         spring: the organ.
         load: (k,) force in mN on the patch before it moves, of everything but these tools.
         change: (k,) the part of `load` that is new in this step, and comes on with the tools' motion.
@@ -65,12 +66,14 @@ class LocalContact:
         contacts: Sequence[ToolContact],
         patch: Patch,
         points_mm: FloatArray,
+        drift_mm: FloatArray,
         spring: Spring,
         load: FloatArray,
         change: FloatArray,
         scale: float,
     ) -> None:
-        self._contacts, self._patch, self._points = tuple(contacts), patch, points_mm
+        self._contacts, self._patch = tuple(contacts), patch
+        self._start, self._drift, self._points = points_mm, drift_mm, points_mm
         self._spring, self._full_load, self._change, self._scale = spring, load, change, scale
         self._load = load
         self._numbers = np.full(3 * len(patch.nodes), -1)  # of the unknowns
@@ -84,7 +87,7 @@ class LocalContact:
             return self._follow(start, goal, tolerance)
 
     def _follow(self, start: ToolState, goal: ToolState, tolerance: float) -> Settled | None:
-        still = start == goal and not self._change.any()
+        still = start == goal and not self._change.any() and not self._drift.any()
         displacement = np.zeros(len(self._load))
         way = max(
             float(np.linalg.norm(contact.motion(self._points, angle), axis=1).max(initial=0.0))
@@ -114,6 +117,7 @@ class LocalContact:
             contact.angle = angle
         self._law = state.law
         self._load = self._full_load - (1.0 - reach) * self._change
+        self._points = self._start + reach * self._drift
         if state.law.cohesion_kpa == 0.0:
             return self._balance(predicted, tolerance)
         found = self._balance(predicted, _ROUGH_TOLERANCE)

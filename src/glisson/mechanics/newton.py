@@ -68,7 +68,7 @@ class Newton:
         self._solver = solver
         self._condenser = Condenser(body)
         self._inner_tolerance = _INNER_TOLERANCE * settings.tolerance
-        self._settings = settings
+        self.settings = settings
         self._longest_step_mm = _LONGEST_STEP * float(np.linalg.norm(np.ptp(body.elasticity.rest, axis=0)))
 
     def solve(self, positions: FloatArray, tolerance: float | None = None) -> NewtonEnd:
@@ -76,7 +76,7 @@ class Newton:
 
         A looser `tolerance` than that of the settings serves where the points that cohere are still sought.
         """
-        body, settings = self._body, self._settings
+        body, settings = self._body, self.settings
         tolerance = settings.tolerance if tolerance is None else tolerance
         loose_steps = waits = pause = rescues = 0
         before = np.inf
@@ -128,7 +128,7 @@ class Newton:
 
     def is_exact(self, end: NewtonEnd) -> bool:
         """Whether an end reached the tolerance of the settings and not only a looser one."""
-        return end.status is Status.CONVERGED and end.residual <= self._settings.tolerance
+        return end.status is Status.CONVERGED and end.residual <= self.settings.tolerance
 
     def advance(self, positions: FloatArray, goal: LoadState) -> FloatArray | None:
         """First-order answer (n, 3) to other tools and loads, which become the body's; None where there is none.
@@ -151,7 +151,7 @@ class Newton:
             step = None if direction is None else direction.step
         else:
             answer = self._condenser.step(
-                patch, positions, touches, balance, change, goal.tools, self._inner_tolerance, exact=True
+                patch, positions, touches, balance, change, carried, goal.tools, self._inner_tolerance, exact=True
             )
             step = None if answer is None else answer.step
         if step is None and (goal.tools.angles != body.loading.tools.angles or carried.any()):
@@ -176,8 +176,10 @@ class Newton:
         if patch is None:
             return None
         memory = body.memory()
-        change = np.zeros_like(positions)
-        answer = self._condenser.step(patch, positions, touches, balance, change, tools, self._inner_tolerance, exact)
+        none = np.zeros_like(positions)
+        answer = self._condenser.step(
+            patch, positions, touches, balance, none, none, tools, self._inner_tolerance, exact
+        )
         if answer is not None and self._allowed_share(answer.step) == 1.0:
             moved = self._search_gain(positions, answer, balance)
             if moved is not None:

@@ -30,7 +30,10 @@ class Numbering:
     def deformation(self, deformation: Deformation, mesh: TetMesh) -> Deformation:
         """A deformation of the ordered model as one of the former `mesh`."""
         stages = tuple(replace(s, displacement=s.displacement[self.new]) for s in deformation.stages)
-        return replace(deformation, mesh=mesh, stages=stages)
+        error = deformation.estimated_error
+        return replace(
+            deformation, mesh=mesh, stages=stages, estimated_error=None if error is None else error[self.new]
+        )
 
 
 def numbering(nodes: FloatArray) -> Numbering:

@@ -26,7 +26,6 @@ from glisson.mechanics.linear_solvers import LinearSolver, make_iterative_solver
 from glisson.mechanics.pattern import FreeSystem, Stiffness, block_pattern, pair_slots
 from glisson.mechanics.unsymmetric import solve_near_symmetric
 
-_TOLERANCE = 1e-8
 _ITERATION_LIMIT = 60
 _STEP_ACCURACY = 1e-3  # of the residual: enough for Newton steps that gain three digits each
 _WEIGHT_SHARES = (0.25, 0.5, 0.75, 1.0)
@@ -70,8 +69,11 @@ def find_rest_shape(
     surface: SurfaceQuadrature,
     fixed: NDArray[np.bool_],
     surface_tolerance_mm: float,
+    accuracy: float,
 ) -> RestShape:
     """The shape that `weights` (n, 3) in mN and the boards deform into the scanned one.
+
+    `accuracy` is the residual over the weight at which it is found.
 
     Raises:
         StageFailed: no unloaded shape was found (the organ is too soft for its weight).
@@ -79,7 +81,7 @@ def find_rest_shape(
     stiffest = max(material.young_modulus_kpa for material in materials.values())
     beds = [_bed(board, mesh, surface, surface_tolerance_mm, _BED_STIFFNESS_SHARE * stiffest) for board in boards]
     problem = _InverseProblem(mesh, materials, weights, beds, surface, fixed)
-    positions = problem.solve()
+    positions = problem.solve(accuracy)
     supports = {bed.name: Support(bed.points, problem.pressures(bed, positions), bed.conforming) for bed in beds}
     return RestShape(positions, supports)
 
@@ -108,29 +110,29 @@ class _InverseProblem:
         self._pairs = pair_slots(self._pattern, surface.nodes)
         self._share = 1.0
 
-    def solve(self) -> FloatArray:
+    def solve(self, accuracy: float) -> FloatArray:
         """X by Newton's method with backtracking on the residual; the weight comes on in steps where it must."""
         solver = make_iterative_solver()
         try:
-            found = self._balanced(np.array(self._mesh.nodes), solver)
+            found = self._balanced(np.array(self._mesh.nodes), solver, accuracy)
             if found is None:
                 found = np.array(self._mesh.nodes)
                 for share in _WEIGHT_SHARES:
                     self._share = share
-                    found = self._balanced(found, solver)
+                    found = self._balanced(found, solver, accuracy)
                     if found is None:
                         raise self._too_soft()
         finally:
             solver.close()
         return found
 
-    def _balanced(self, positions: FloatArray, solver: LinearSolver) -> FloatArray | None:
+    def _balanced(self, positions: FloatArray, solver: LinearSolver, accuracy: float) -> FloatArray | None:
         """X for the present share of the weight, started from another share's; None where none is found."""
         force = self._unbalanced(positions)
         reference = self._share * float(np.linalg.norm(self._weights))
         for _ in range(_ITERATION_LIMIT):
             size = float(np.linalg.norm(force))
-            if size <= _TOLERANCE * reference:
+            if size <= accuracy * reference:
                 return positions
             step = self._step(positions, force, solver)
             found = None if step is None else self._search(positions, step, size)
