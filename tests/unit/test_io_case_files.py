@@ -126,7 +126,8 @@ def deformation() -> Deformation:
         LoadStep("x", 1.0, 50, math.nan, 1.0, Status.INVERTED),
     )
     events = (Event("lost_contact", "lever", 23.5), Event("stuck", "board", None))
-    return Deformation(mesh, stages, Status.STAGNATED, "The residual stagnated in stage settle.", record, events)
+    error = rng.uniform(size=len(mesh.nodes))
+    return Deformation(mesh, stages, Status.STAGNATED, "The residual stagnated in stage settle.", record, events, error)
 
 
 def observations() -> Observations:

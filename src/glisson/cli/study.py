@@ -14,12 +14,14 @@ from glisson.studies.elements.study import Elements
 from glisson.studies.executor import Executor
 from glisson.studies.lift_robustness.study import LiftRobustness
 from glisson.studies.local_pool import LocalPool
+from glisson.studies.region.study import RegionStudy
 from glisson.studies.sensitivity.study import Sensitivity
 from glisson.studies.study import Study, run_study
 
 STUDIES = {
     "elements": "how much error linear and quadratic elements leave in the same time",
     "lift-robustness": "whether the lever lift converges whatever liver, lever, tissue and contact",
+    "region": "how much faster a lift is by its region of interest, and what that costs",
     "sensitivity": "how much mesh, law, stiffness, compressibility and contact move the tumour's place",
 }
 
@@ -59,6 +61,8 @@ def _study(arguments: argparse.Namespace) -> Study:
         return LiftRobustness.of(arguments.quick, seed or 0)
     if arguments.study == Elements.name:
         return Elements.of(arguments.quick)
+    if arguments.study == RegionStudy.name:
+        return RegionStudy.of(arguments.quick)
     return Sensitivity.of(arguments.quick, arguments.long, arguments.element)
 
 

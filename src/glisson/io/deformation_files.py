@@ -1,5 +1,7 @@
 """A deformation on disk: `deformation.vtu` (a displacement field for each stage) and `deformation.json`.
 
+A technique's estimate of its error is a field of the former.
+
 The JSON file holds status, message, convergence record, events and contacts. A number that is not finite
 (the residual of a failed step) is null there and NaN when read; a least gap that is null is None.
 """
@@ -24,6 +26,7 @@ SCHEMA = 1
 """Version of the layout that is written; older ones are read."""
 
 _NAME = "deformation"
+_ERROR = "estimated error"
 
 
 def write_deformation(folder: str | Path, deformation: Deformation) -> None:
@@ -52,6 +55,8 @@ def write_deformation(folder: str | Path, deformation: Deformation) -> None:
         "events": [vars(event) for event in deformation.events],
     }
     arrays = {field: stage.displacement for field, stage in zip(fields, deformation.stages, strict=True)}
+    if deformation.estimated_error is not None:
+        arrays[_ERROR] = deformation.estimated_error
     write_pair(Path(folder), _NAME, deformation.mesh, arrays, values)
 
 
@@ -69,6 +74,7 @@ def read_deformation(folder: str | Path) -> Deformation:
             message=record.text("message"),
             record=tuple(_step(entry) for entry in record.records("record")),
             events=tuple(_event(entry) for entry in record.records("events")),
+            estimated_error=cells.point_data.get(_ERROR),
         )
 
 

@@ -37,9 +37,11 @@ def linear_model(model: Model) -> tuple[Model, IntArray]:
 
 
 def with_middles(mesh: TetMesh, corners: IntArray, of_corners: FloatArray) -> FloatArray:
-    """A field (n, 3) on a T10 mesh that is linear in its elements, from that (k, 3) of its nodes `corners` (k,)."""
+    """A field (n, 3) that is linear in a mesh's elements, from that (k, 3) of its nodes `corners` (k,)."""
     field = np.zeros_like(mesh.nodes)
     field[corners] = of_corners
+    if not mesh.is_quadratic:
+        return field
     ends = field[mesh.corners[:, TET_EDGES]]
     field[mesh.tetrahedra[:, 4:]] = 0.5 * (ends[:, :, 0] + ends[:, :, 1])
     return field

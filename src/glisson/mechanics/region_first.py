@@ -22,7 +22,7 @@ _FIRST_REACH = 0.2  # before it a tool only just comes to bear: many steps for l
 _LOOSEST = 1e-3  # residual of the load steps of the region; their ends are exact
 _MOST = 0.7  # of the elements: a region that large saves nothing
 _MARGIN = 0.1  # of the cushion: the whole organ's equilibrium presses somewhat harder
-_ERROR_SHARE = 0.04  # of a correction, that is left as an error; see docs/mechanics.md
+_ERROR_SHARE = 0.02  # of a correction that stays as an error; found on members of the family that no figure is told of
 
 
 class RegionFirst:

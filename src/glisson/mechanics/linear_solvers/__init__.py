@@ -7,6 +7,7 @@ from scipy.sparse import csr_matrix
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.mechanics.linear_solvers.conjugate_gradients import ConjugateGradients
 from glisson.mechanics.linear_solvers.multigrid import Multigrid
+from glisson.mechanics.linear_solvers.nothing_condensed import NothingCondensed
 from glisson.mechanics.linear_solvers.pardiso import Pardiso, PardisoCondensation, pardiso_library
 from glisson.mechanics.linear_solvers.superlu import SuperLU, SuperLUCondensation
 from glisson.mechanics.pattern import Stiffness
@@ -59,4 +60,6 @@ def make_iterative_solver() -> LinearSolver:
 
 def make_condensation(size: int, kept: IntArray) -> Condensation:
     """Condenses matrices of `size` unknowns onto those of the ascending numbers `kept` (k,)."""
+    if len(kept) == size:
+        return NothingCondensed()
     return PardisoCondensation(size, kept) if pardiso_library() is not None else SuperLUCondensation(size, kept)
