@@ -14,12 +14,13 @@ import ipctk
 import numpy as np
 import pytest
 from lifts import lift, slab, slab_lever
-from triangles import lever_surface, organ_surface
+from triangles import organ_surface
 
 from glisson.core import Lever, LeverDrive, Status
 from glisson.core.deformation import ContactReport
 from glisson.core.mesh import TriangleSurface
 from glisson.mechanics.lever_tool import LeverTool
+from glisson.studies.contact.tool_surfaces import lever_surface
 
 ipctk.set_num_threads(1)
 

@@ -9,6 +9,7 @@ from glisson.cli.console import Answer
 from glisson.cli.progress import StageLines
 from glisson.core.errors import BadInput
 from glisson.io.atomic import atomic_path
+from glisson.studies.contact.study import ContactStudy
 from glisson.studies.dask_cluster import DaskCluster
 from glisson.studies.elements.study import Elements
 from glisson.studies.executor import Executor
@@ -19,6 +20,7 @@ from glisson.studies.sensitivity.study import Sensitivity
 from glisson.studies.study import Study, run_study
 
 STUDIES = {
+    "contact": "how far the tumour is apart with our contact and with that of the IPC Toolkit",
     "elements": "how much error linear and quadratic elements leave in the same time",
     "lift-robustness": "whether the lever lift converges whatever liver, lever, tissue and contact",
     "region": "how much faster a lift is by its region of interest, and what that costs",
@@ -56,9 +58,11 @@ def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
 
 
 def _study(arguments: argparse.Namespace) -> Study:
+    seed = _whole_number(arguments.seed, "--seed", 0) or 0
     if arguments.study == LiftRobustness.name:
-        seed = _whole_number(arguments.seed, "--seed", 0)
-        return LiftRobustness.of(arguments.quick, seed or 0)
+        return LiftRobustness.of(arguments.quick, seed)
+    if arguments.study == ContactStudy.name:
+        return ContactStudy.of(arguments.quick, seed)
     if arguments.study == Elements.name:
         return Elements.of(arguments.quick)
     if arguments.study == RegionStudy.name:
