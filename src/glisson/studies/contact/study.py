@@ -14,8 +14,8 @@ from glisson.studies.study import Conclusion
 from glisson.studies.tables import as_csv
 
 CASES, QUICK_CASES = 20, 2
-EDGE_MM = 40.0
-"""About 2,000 quadratic elements."""
+EDGE_MM, QUICK_EDGE_MM = 40.0, 60.0
+"""About 2,000 and 800 quadratic elements."""
 
 
 @dataclass(frozen=True)
@@ -26,11 +26,12 @@ class ContactStudy:
 
     seed: int = 0
     count: int = CASES
+    edge_length_mm: float = EDGE_MM
 
     @classmethod
     def of(cls, quick: bool, seed: int) -> "ContactStudy":
         """The quick or the usual form."""
-        return cls(seed, QUICK_CASES if quick else CASES)
+        return cls(seed, QUICK_CASES, QUICK_EDGE_MM) if quick else cls(seed)
 
     def preparations(self) -> Sequence[Point]:
         """None."""
@@ -39,7 +40,7 @@ class ContactStudy:
     def points(self, prepared: Mapping[str, Outcome]) -> Sequence[Point]:
         """One for each lift."""
         cases = [draw_case(self.seed, n) for n in range(self.count)]
-        return [Point(COMPARE, {"case": asdict(case), "edge_length_mm": EDGE_MM}) for case in cases]
+        return [Point(COMPARE, {"case": asdict(case), "edge_length_mm": self.edge_length_mm}) for case in cases]
 
     def conclude(self, prepared: Mapping[str, Outcome], done: Mapping[str, Outcome]) -> Conclusion:
         """A row for each lift, the distribution of the distances, and where branches differ."""
