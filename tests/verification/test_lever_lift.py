@@ -8,7 +8,7 @@ import pytest
 from lifts import BOARD, DOWN, WIDE, lift, slab, slab_lever
 
 from glisson.core import BadInput, ContactLaw, Lever, LeverDrive, Scenario, Stage, Status
-from glisson.mechanics import quasi_static
+from glisson.mechanics import loaded_body
 from glisson.mechanics.body import LoadState
 from glisson.mechanics.contact_law import Cushion
 from glisson.mechanics.load_path import LoadPath
@@ -52,8 +52,8 @@ def test_a_force_is_balanced_after_the_cushion_was_stiffened(monkeypatch: pytest
         stiffened.append(factor)
         return replace(cushion, stiffness_kpa_mm=cushion.stiffness_kpa_mm * factor)
 
-    monkeypatch.setattr(quasi_static, "_CUSHION_STIFFNESS_KPA", 2.0)
-    monkeypatch.setattr(quasi_static, "_CUSHION_STIFFNESS_MODULI", 0.1)
+    monkeypatch.setattr(loaded_body, "_CUSHION_STIFFNESS_KPA", 2.0)
+    monkeypatch.setattr(loaded_body, "_CUSHION_STIFFNESS_MODULI", 0.1)
     monkeypatch.setattr(Cushion, "stiffened", stiffer)
     answer = lift(slab(7.0, (6, 2, 2)), LeverDrive("lever", force_n=0.47), cohesion_kpa=0.0)
     assert answer.status is Status.CONVERGED, answer.message

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from glisson.core.errors import BadInput
 from glisson.core.status import Status
 from glisson.framework.hashing import package_version
+from glisson.framework.interruptions import interruptions_held
 from glisson.framework.lock import Claim, try_claim
 from glisson.framework.provenance import KEY_PACKAGES
 from glisson.io.atomic import atomic_paths
@@ -72,7 +73,8 @@ class PointStore:
         text = json.dumps(record, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
         path = self._path(point)
         places = [path.with_suffix(".npz"), path] if outcome.arrays else [path]
-        with atomic_paths(*places) as made:
+        # An interruption while NumPy packs arrays would come out as an error of its own.
+        with interruptions_held(), atomic_paths(*places) as made:
             made[-1].write_text(text, encoding="utf-8")
             if outcome.arrays:
                 with made[0].open("wb") as stream:
