@@ -13,6 +13,7 @@ from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.errors import BadInput
 from glisson.core.mesh import TetMesh
 from glisson.mechanics.faces import face_nodes
+from glisson.mechanics.node_pairs import node_pairs
 from glisson.mechanics.parts import Memoryless
 
 _STIFFNESS_KPA = 200.0  # of the barrier, far above the pressure of an organ's weight (0.5 kPa)
@@ -71,18 +72,7 @@ class SelfContact(Memoryless):
         places = self._taken(positions)
         method = self._ipctk.PSDProjectionMethod.CLAMP if project else self._ipctk.PSDProjectionMethod.NONE
         hessian = self._barrier.hessian(self._collisions(places), self._surface, places, method)
-        blocks = hessian.tobsr((3, 3))
-        blocks.sum_duplicates()
-        rows = np.repeat(np.arange(len(self._nodes)), np.diff(blocks.indptr))
-        columns = blocks.indices
-        upper = rows <= columns
-        rows, columns, data = rows[upper], columns[upper], blocks.data[upper]
-        local = np.zeros((len(rows), 2, 2, 3, 3))
-        apart = rows != columns
-        local[~apart, 0, 0] = data[~apart]
-        local[apart, 0, 1] = data[apart]
-        local[apart, 1, 0] = data[apart].transpose(0, 2, 1)
-        return np.column_stack([self._nodes[rows], self._nodes[columns]]), local
+        return node_pairs(hessian, self._nodes)
 
     def _taken(self, positions: FloatArray) -> FloatArray:
         """The surface's nodes, as the toolkit wants them."""

@@ -3,6 +3,9 @@
 import numpy as np
 
 from glisson.core.mesh import TetMesh, TriangleSurface
+from glisson.phantom.liver_shape import build_shape
+from glisson.phantom.proportions import Proportions
+from glisson.phantom.solid_surface import solid_surface
 from glisson.preoperative.mmg import Mmg, MmgParameters
 
 _ENVELOPE = 1.0 / 16.0
@@ -11,7 +14,22 @@ _ENVELOPE = 1.0 / 16.0
 _LARGEST_ENVELOPE_MM = 3.0
 _FIRST_EDGE_MM, _FIRST_ELEMENTS, _FIRST_POWER = 16.0, 8400.0, 2.0
 _CLOSE = 0.02
+_SURFACE_STEP_MM = 2.5
 _TRIES = 7
+
+
+def member_surface(proportions: Proportions) -> TriangleSurface:
+    """The surface of a member of the phantom family in its rest shape, as fine as studies mesh it."""
+    return solid_surface(build_shape(proportions).liver, _SURFACE_STEP_MM)
+
+
+def member_mesh(proportions: Proportions, edge_mm: float) -> TetMesh:
+    """A T4 mesh of a member with elements of about that edge length.
+
+    Raises:
+        StageFailed: no mesh could be made.
+    """
+    return Mmg(MmgParameters(edge_length_mm=edge_mm, envelope_mm=_ENVELOPE * edge_mm)).mesh(member_surface(proportions))
 
 
 def mesh_of_size(surface: TriangleSurface, elements: int) -> tuple[TetMesh, float]:

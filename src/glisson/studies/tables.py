@@ -1,9 +1,11 @@
-"""Rows as a table that any program reads."""
+"""Rows as a table that any program reads, and the distribution of a column."""
 
 import csv
 import io
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
+
+import numpy as np
 
 
 def as_csv(rows: Sequence[Mapping[str, Any]], leave_out: Collection[str] = ()) -> bytes:
@@ -14,3 +16,15 @@ def as_csv(rows: Sequence[Mapping[str, Any]], leave_out: Collection[str] = ()) -
     writer.writeheader()
     writer.writerows(rows)
     return stream.getvalue().encode()
+
+
+def distribution(values: Sequence[float], low: bool = False) -> dict[str, float] | None:
+    """Median, 95th percentile (`tail`) and worst of values; 5th and least where `low` ones are the bad ones."""
+    if not values:
+        return None
+    percentile, worst = (5, min(values)) if low else (95, max(values))
+    return {
+        "median": float(np.median(values)),
+        "tail": float(np.percentile(values, percentile)),
+        "worst": float(worst),
+    }

@@ -10,6 +10,7 @@ from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.errors import BadInput
 from glisson.core.mesh import TetMesh, TriangleSurface
 from glisson.geometry.quadratic import straight_boundary
+from glisson.mechanics.node_pairs import node_pairs
 from glisson.mechanics.tools import RigidTool
 
 _RANGE_MM = 0.1  # of the barrier, as that of our cushion
@@ -86,16 +87,7 @@ class IpcTools:
         hessian = self._barrier.hessian(self._collisions(places), self._mesh, places, projection)
         hessian = hessian + self._rubbing.hessian(self._lagged, self._mesh, self._moved(places), projection)
         size = 3 * len(self._nodes)
-        blocks = hessian[:size, :size].tobsr((3, 3))
-        rows = np.repeat(np.arange(len(self._nodes)), np.diff(blocks.indptr))
-        upper = rows <= blocks.indices
-        rows, columns, data = rows[upper], blocks.indices[upper], blocks.data[upper]
-        local = np.zeros((len(rows), 2, 2, 3, 3))
-        apart = rows != columns
-        local[~apart, 0, 0] = data[~apart]
-        local[apart, 0, 1] = data[apart]
-        local[apart, 1, 0] = data[apart].transpose(0, 2, 1)
-        return np.column_stack([self._nodes[rows], self._nodes[columns]]), local
+        return node_pairs(hessian[:size, :size], self._nodes)
 
     def renew(self, positions: FloatArray) -> None:
         """Take friction's limits and directions from the present pressure."""

@@ -4,14 +4,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
 from glisson.studies.contact.tasks import COMPARE
 from glisson.studies.lift_robustness.cases import draw_case
 from glisson.studies.page import Page, Table, number, page_as_html
 from glisson.studies.point import Outcome, Point
 from glisson.studies.study import Conclusion
-from glisson.studies.tables import as_csv
+from glisson.studies.tables import as_csv, distribution
 
 CASES, QUICK_CASES = 20, 2
 EDGE_MM, QUICK_EDGE_MM = 40.0, 60.0
@@ -52,7 +50,7 @@ class ContactStudy:
         values: dict[str, Any] = {
             "rows": rows,
             "lifts": len(rows),
-            "apart_mm": _spread(apart),
+            "apart_mm": distribution(apart),
             "other_branch": [row for row in good if row not in same],
             "failed": [row for row in rows if row["status"] != "converged"],
             "unfinished": len(points) - len(rows),
@@ -75,18 +73,12 @@ def _row(point: Point, outcome: Outcome) -> dict[str, Any]:
     }
 
 
-def _spread(values: Sequence[float]) -> dict[str, float] | None:
-    if not values:
-        return None
-    return {"median": float(np.median(values)), "p95": float(np.percentile(values, 95)), "worst": max(values)}
-
-
 def _lines(values: Mapping[str, Any]) -> list[str]:
     lines = [f"lifts     {values['lifts']}, {len(values['other_branch'])} of them on different branches"]
     if values["apart_mm"]:
         spread = values["apart_mm"]
         lines.append(
-            f"apart     median {spread['median']:.2f} mm, 95th percentile {spread['p95']:.2f} mm, "
+            f"apart     median {spread['median']:.2f} mm, 95th percentile {spread['tail']:.2f} mm, "
             f"worst {spread['worst']:.2f} mm, where the branch is the same"
         )
     lines += [

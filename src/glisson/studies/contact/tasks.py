@@ -17,14 +17,12 @@ from glisson.core.tools import Board, Lever, Tool
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
 from glisson.mechanics.tools import make_tool
 from glisson.phantom.family import build_anatomy, scanned_structures
-from glisson.phantom.liver_shape import build_shape
 from glisson.phantom.proportions import draw_proportions
-from glisson.phantom.solid_surface import solid_surface
-from glisson.preoperative.mmg import Mmg, MmgParameters
 from glisson.studies.contact.ipc_lift import IpcLift, lift_by_ipc
 from glisson.studies.lift_robustness.cases import LiftCase
 from glisson.studies.lift_robustness.tasks import scenario_of
 from glisson.studies.lifts import LIFT_PACKAGES, carried_centroid, lift_model
+from glisson.studies.meshing import member_mesh
 from glisson.studies.point import Outcome, Task
 
 COMPARE = Task(
@@ -32,6 +30,7 @@ COMPARE = Task(
     (
         *LIFT_PACKAGES,
         "glisson.studies.lifts",
+        "glisson.studies.meshing",
         "glisson.studies.lift_robustness.cases",
         "glisson.studies.lift_robustness.tasks",
         "glisson.studies.contact.ipc_lift",
@@ -41,7 +40,6 @@ COMPARE = Task(
     ),
 )
 
-_SURFACE_STEP_MM = 2.5
 _CLEARANCE_MM = 0.3
 _BEARS_N = 0.01
 
@@ -50,9 +48,7 @@ def compare_contact(inputs: Mapping[str, Any], folder: Path) -> Outcome:
     """Where the lobe ends with both contacts, and how far apart (mm) they put the tumours."""
     case = LiftCase(**inputs["case"])
     proportions = draw_proportions(case.member)
-    surface = solid_surface(build_shape(proportions).liver, _SURFACE_STEP_MM)
-    edge_mm = inputs["edge_length_mm"]
-    mesh = Mmg(MmgParameters(edge_length_mm=edge_mm, envelope_mm=edge_mm / 16.0)).mesh(surface)
+    mesh = member_mesh(proportions, inputs["edge_length_mm"])
     model = lift_model(mesh, Material("neo-hookean", case.young_modulus_kpa, case.poisson_ratio))
     scenario = _from_the_air(scenario_of(case, proportions), mesh, case.friction)
     started = perf_counter()

@@ -15,30 +15,30 @@ from glisson.core.tools import Board, Lever
 from glisson.core.units import radians
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
 from glisson.phantom.lever_lift import lever_lift
-from glisson.phantom.liver_shape import build_shape
 from glisson.phantom.proportions import Proportions, draw_proportions
-from glisson.phantom.solid_surface import solid_surface
 from glisson.phantom.truth_checks import gap_to_lever, height_over_board, inverted_elements, surface_nodes
-from glisson.preoperative.mmg import Mmg, MmgParameters
 from glisson.studies.lift_robustness.cases import LiftCase
 from glisson.studies.lifts import LIFT_PACKAGES, lift_model, outcome_of, with_contact
+from glisson.studies.meshing import member_mesh
 from glisson.studies.point import Outcome, Task
 
 LIFT = Task(
     f"{__name__}:solve_case",
-    (*LIFT_PACKAGES, "glisson.studies.lifts", "glisson.studies.lift_robustness.cases", __name__),
+    (
+        *LIFT_PACKAGES,
+        "glisson.studies.lifts",
+        "glisson.studies.meshing",
+        "glisson.studies.lift_robustness.cases",
+        __name__,
+    ),
 )
-
-_SURFACE_STEP_MM = 2.5
 
 
 def solve_case(inputs: Mapping[str, Any], folder: Path) -> Outcome:
     """Mesh the member, lift its lobe, and check the end with code that shares nothing with the solver's."""
     case = LiftCase(**inputs["case"])
     proportions = draw_proportions(case.member)
-    surface = solid_surface(build_shape(proportions).liver, _SURFACE_STEP_MM)
-    edge_mm = inputs["edge_length_mm"]
-    mesh = Mmg(MmgParameters(edge_length_mm=edge_mm, envelope_mm=edge_mm / 16.0)).mesh(surface)
+    mesh = member_mesh(proportions, inputs["edge_length_mm"])
     scenario = scenario_of(case, proportions)
     model = lift_model(mesh, Material("neo-hookean", case.young_modulus_kpa, case.poisson_ratio))
     deformation = QuasiStatic(QuasiStaticParameters()).solve(model, scenario)

@@ -4,13 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
 from glisson.studies.page import Page, Table, number, page_as_html
 from glisson.studies.point import Outcome, Point
 from glisson.studies.region.tasks import COMPARE
 from glisson.studies.study import Conclusion
-from glisson.studies.tables import as_csv
+from glisson.studies.tables import as_csv, distribution
 
 FIRST_MEMBER = 600
 """Members of the phantom family from here on are this study's; the technique was tuned on earlier ones."""
@@ -51,9 +49,9 @@ class RegionStudy:
         factors = [_factor(row["estimated_mm"], row["apart_mm"]) for row in good if row["estimated_mm"]]
         values: dict[str, Any] = {
             "rows": rows,
-            "times_as_fast": _spread(faster, low=True),
-            "apart_mm": _spread([row["apart_mm"] for row in good]),
-            "estimate_off_by": _spread(factors),
+            "times_as_fast": distribution(faster, low=True),
+            "apart_mm": distribution([row["apart_mm"] for row in good]),
+            "estimate_off_by": distribution(factors),
             "failed": [row for row in rows if row["apart_mm"] is None],
             "unfinished": sum(point.key not in done for point in points),
         }
@@ -85,14 +83,6 @@ def _rows(point: Point, outcome: Outcome) -> list[dict[str, Any]]:
 def _factor(estimated: float, true: float) -> float:
     """By which factor an estimate is off, whichever way."""
     return max(estimated / true, true / estimated)
-
-
-def _spread(values: Sequence[float], low: bool = False) -> dict[str, float] | None:
-    """Median, 95th percentile and worst of values; 5th and least where `low` ones are the bad ones."""
-    if not values:
-        return None
-    tail, worst = (5, min(values)) if low else (95, max(values))
-    return {"median": float(np.median(values)), "tail": float(np.percentile(values, tail)), "worst": float(worst)}
 
 
 def _lines(values: Mapping[str, Any]) -> list[str]:

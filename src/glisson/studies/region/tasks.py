@@ -19,26 +19,22 @@ from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
 from glisson.mechanics.region_of_interest import RegionOfInterest, RegionOfInterestParameters
 from glisson.phantom.family import build_anatomy, scanned_structures
 from glisson.phantom.lever_lift import lever_lift
-from glisson.phantom.liver_shape import build_shape
 from glisson.phantom.proportions import draw_proportions
-from glisson.phantom.solid_surface import solid_surface
 from glisson.studies.lifts import LIFT_PACKAGES, carried_centroid, lift_model
-from glisson.studies.meshing import mesh_of_size
+from glisson.studies.meshing import member_surface, mesh_of_size
 from glisson.studies.point import Outcome, Task
 
 COMPARE = Task(
     f"{__name__}:compare_lift", (*LIFT_PACKAGES, "glisson.studies.lifts", "glisson.studies.meshing", __name__)
 )
 
-_SURFACE_STEP_MM = 2.5
 _LIVER = Material("neo-hookean", 7.0, 0.45)
 
 
 def compare_lift(inputs: Mapping[str, Any], folder: Path) -> Outcome:
     """Seconds of both, and for each tumour how far apart they put its centroid beside what was estimated (mm)."""
     proportions = draw_proportions(inputs["member"])
-    surface = solid_surface(build_shape(proportions).liver, _SURFACE_STEP_MM)
-    mesh, _ = mesh_of_size(surface, inputs["elements"])
+    mesh, _ = mesh_of_size(member_surface(proportions), inputs["elements"])
     tumours = scanned_structures(build_anatomy(inputs["member"]).interior, None).tumours
     model, scenario = lift_model(_with_tumours(mesh, tumours), _LIVER), lever_lift(proportions)
     values: dict[str, Any] = {"elements": len(mesh.tetrahedra)}
