@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_matrix, coo_matrix, csr_matrix
 
 from glisson.core.arrays import FloatArray, IntArray
-from glisson.mechanics.block_rows import BlockRows
+from glisson.mechanics.block_rows import BlockRows, Blocks
+from glisson.mechanics.symmetric_rows import HalfPattern, SymmetricRows
 
 Index = NDArray[np.int32]
 """Half the memory of `IntArray`: patterns are as large as the matrix itself."""
@@ -61,6 +62,11 @@ class BlockPattern:
     def _diagonal(self) -> IntArray:
         rows = np.repeat(np.arange(len(self.indptr) - 1), np.diff(self.indptr))
         return np.flatnonzero(rows == self.indices)
+
+    @cached_property
+    def half(self) -> HalfPattern:
+        """What is kept of symmetric matrices for products and sweeps."""
+        return HalfPattern(self.indptr, self.indices)
 
     def matrix(self, blocks: FloatArray) -> bsr_matrix:
         """The matrix of block values (b, 3, 3), over all unknowns."""
@@ -160,13 +166,24 @@ class Stiffness:
 
     def product(self, field: FloatArray) -> FloatArray:
         """The forces (n, 3) on free unknowns of a nodal field (n, 3) that vanishes on the held ones."""
-        forces = self._rows.product(field).astype(np.float64, copy=False)
+        return self._on_free(self._rows.product(field))
+
+    def symmetric_product(self, field: FloatArray) -> FloatArray:
+        """The same where the matrix is symmetric, in less than half the time."""
+        return self._on_free(self._symmetric_rows.product(field))
+
+    def _on_free(self, product: Blocks) -> FloatArray:
+        forces = product.astype(np.float64, copy=False)
         forces[self.held] = 0.0
         return forces
 
     @cached_property
     def _rows(self) -> BlockRows:
         return BlockRows(self.pattern.indptr, self.pattern.indices, self.blocks)
+
+    @cached_property
+    def _symmetric_rows(self) -> SymmetricRows:
+        return SymmetricRows(self.pattern.half, self.blocks, np.float64)
 
 
 @njit(cache=True)

@@ -1,6 +1,7 @@
 """Solves with a matrix that is not symmetric but close to one that a solver has at hand."""
 
 from scipy.sparse.linalg import LinearOperator, gmres
+from threadpoolctl import threadpool_limits
 
 from glisson.core.arrays import FloatArray
 from glisson.mechanics.linear_solvers import LinearSolver
@@ -17,12 +18,13 @@ def solve_near_symmetric(matrix: Stiffness, solver: LinearSolver, right: FloatAr
     """
     system = matrix.system
     shape = (len(system.free), len(system.free))
-    found, _ = gmres(
-        LinearOperator(shape, lambda values: system.restrict(matrix.product(system.extend(values))), dtype=float),
-        system.restrict(right),
-        M=LinearOperator(shape, lambda v: system.restrict(solver.precondition(system.extend(v))), dtype=float),
-        rtol=accuracy,
-        restart=_KRYLOV_VECTORS,
-        maxiter=1,
-    )
+    with threadpool_limits(1):  # a BLAS with many threads would make those of the products wait
+        found, _ = gmres(
+            LinearOperator(shape, lambda values: system.restrict(matrix.product(system.extend(values))), dtype=float),
+            system.restrict(right),
+            M=LinearOperator(shape, lambda v: system.restrict(solver.precondition(system.extend(v))), dtype=float),
+            rtol=accuracy,
+            restart=_KRYLOV_VECTORS,
+            maxiter=1,
+        )
     return system.extend(found)

@@ -67,7 +67,7 @@ class ConjugateGradients:
             # The form that bears with a preconditioner's rounding (Golub and Ye 1999, SIAM J. Sci. Comput. 21).
             product = dot(left, scaled)
             scale_and_add(direction, (product - dot(before, scaled)) / product_before, scaled)
-            pushed = matrix.product(direction)
+            pushed = matrix.symmetric_product(direction)
             stiffness = dot(direction, pushed)
             if not (product > 0.0 and stiffness > 0.0):
                 return None

@@ -18,6 +18,7 @@ from threadpoolctl import threadpool_limits
 from glisson.core.arrays import FloatArray
 from glisson.mechanics.block_rows import BlockRows
 from glisson.mechanics.pattern import Stiffness
+from glisson.mechanics.symmetric_rows import HalfPattern, SymmetricRows
 
 _COARSEST = 700  # unknowns, for which a dense inverse costs nothing
 _POWER_STEPS = 12
@@ -32,7 +33,7 @@ Single = NDArray[np.float32]
 class _Level:
     """Matrix, inverses of its diagonal blocks (n, 3, 3), and the way to the next coarser level and back."""
 
-    rows: BlockRows
+    rows: SymmetricRows
     inverses: Single
     down: BlockRows
     up: BlockRows
@@ -62,7 +63,7 @@ class Multigrid:
             fine.sort_indices()
             if fine.shape[0] <= _COARSEST:
                 break
-            rows = BlockRows.of(fine, np.float32)
+            rows = _symmetric_rows(fine)
             inverses = rows.inverses(np.zeros((fine.shape[0] // 3, 3), dtype=np.bool_))
         self._coarsest = _inverse(fine.toarray())
         return True
@@ -94,11 +95,15 @@ class Multigrid:
         return solution
 
 
-def _first_level(matrix: Stiffness) -> tuple[BlockRows, Single]:
+def _first_level(matrix: Stiffness) -> tuple[SymmetricRows, Single]:
     """The matrix in single precision, and its diagonal blocks' inverses, which leave held unknowns at rest."""
-    pattern = matrix.pattern
-    rows = BlockRows(pattern.indptr, pattern.indices, matrix.blocks.astype(np.float32))
+    rows = SymmetricRows(matrix.pattern.half, matrix.blocks, np.float32)
     return rows, rows.inverses(matrix.held)
+
+
+def _symmetric_rows(matrix: bsr_matrix) -> SymmetricRows:
+    cut = BlockRows.of(matrix, np.float32)
+    return SymmetricRows(HalfPattern(cut.indptr, cut.indices), cut.blocks, np.float32)
 
 
 def _rigid_modes(matrix: Stiffness) -> FloatArray:
