@@ -177,7 +177,8 @@ class LoadPath:
         body = self.body
         memory, start = body.memory(), body.loading
         if body.is_possible(predicted):
-            end = self._from(predicted, goal, exact=True)
+            body.loading = goal
+            end = self.equilibrium(predicted)
             if end.status is Status.CONVERGED:
                 self.accept(reach, end)
                 return end
@@ -187,17 +188,12 @@ class LoadPath:
 
     def settle(self, goal: LoadState, positions: FloatArray) -> NewtonEnd:
         """Rough equilibrium at the goal near some positions (n, 3), from which the path then goes on."""
-        end = self._from(positions, goal, exact=False)
+        self.body.loading = goal
+        end = self.equilibrium(positions, exact=False)
         if end.status is Status.CONVERGED:
             self.positions = end.positions
             self.body.accept(end.positions)
         return end
-
-    def _from(self, positions: FloatArray, goal: LoadState, exact: bool) -> NewtonEnd:
-        """Equilibrium at the goal from some positions (n, 3); contact with moving tools is met exactly first."""
-        self.body.loading = goal
-        met = self.newton.advance(positions, goal)
-        return self.equilibrium(positions if met is None or not self.body.is_possible(met) else met, exact)
 
     def _flow(self, goal: LoadState) -> NewtonEnd:
         """Equilibrium at the goal that is not near, as after a slip or a snap: the organ flows there.

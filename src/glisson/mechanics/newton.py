@@ -11,6 +11,7 @@ from glisson.mechanics.body import Balance, Body, LoadState
 from glisson.mechanics.condenser import CondensedStep, Condenser
 from glisson.mechanics.contact import Touch
 from glisson.mechanics.free_motion import find_free_motion
+from glisson.mechanics.inexact_newton import step_accuracy
 from glisson.mechanics.linear_solvers import LinearSolver
 from glisson.mechanics.unsymmetric import solve_near_symmetric
 
@@ -18,7 +19,7 @@ _ARMIJO = 1e-4
 _HALVINGS = 40
 _ROUND_OFF = 1e-13  # share of the energy that may be lost to rounding in a difference of energies
 _LONGEST_STEP = 0.05  # of the body's diagonal, for any node in one iteration
-_SLOW = 0.9  # share of a residual that an iteration leaves, from which on exact contact may pay
+_SLOW = 1.5  # share of a residual that an iteration leaves, from which on exact contact may pay
 _STALE_RESCUES = 2  # such steps in a row that may use the stiffness of an earlier one
 _COUPLED_RESIDUAL = 1e-2  # below it friction that follows the pressure is worth its price
 _COUPLED_GAIN = 0.3  # what such a step must make of the residual to be taken
@@ -28,7 +29,6 @@ _LONGEST_PAUSE = 7  # iterations between attempts at exact contact that failed
 _INNER_TOLERANCE = 0.1  # of the outer one
 _FIRST_ACCURACY = 0.1  # of the first-order answer to a load step
 _LOOSEST = 0.1  # accuracy of a Newton step
-_ENOUGH = 0.3  # of the tolerance, for what the last step leaves
 _LOOSE_STEPS = 8  # steps in a row of a body that nothing holds, before its free motion is looked for
 
 
@@ -102,7 +102,7 @@ class Newton:
             else:
                 rescues = rescues if slow else 0
                 waits -= int(slow)
-            accuracy, before = self._accuracy(balance.residual, before, tolerance), balance.residual
+            accuracy, before = step_accuracy(balance.residual, before, tolerance, _LOOSEST), balance.residual
             moved = self._coupled(positions, touches, balance, accuracy)
             if moved is not None:
                 positions = moved
@@ -134,17 +134,22 @@ class Newton:
         """First-order answer (n, 3) to other tools and loads, which become the body's; None where there is none.
 
         The organ goes along with moving tools and carried parts instead of being overrun by them; while they
-        stand still, an organ without an answer stays where it is.
+        stand still, an organ on tools, or without an answer, stays where it is.
         """
         body = self._body
+        carried = goal.carried - body.carried
+        moving = goal.tools.angles != body.loading.tools.angles or bool(carried.any())
+        patch = self._condenser.patch(positions, goal.tools.angles)
+        if patch is not None and not moving:
+            body.loading = goal
+            return positions
         body.renew_cohesion(positions)
         touches = body.touches(positions)
         balance = body.balance(positions, touches)
-        change, carried = body.load_change(positions, goal), goal.carried - body.carried
+        change = body.load_change(positions, goal)
         if carried.any():
             change = change - self._pull(positions, touches, carried)
         change = np.where(body.fixed, 0.0, change)
-        patch = self._condenser.patch(positions, goal.tools.angles)
         if patch is None:
             forces = balance.unbalanced + change
             direction = self._direction(positions, touches, forces, _FIRST_ACCURACY)
@@ -154,7 +159,7 @@ class Newton:
                 patch, positions, touches, balance, change, carried, goal.tools, self._inner_tolerance, exact=True
             )
             step = None if answer is None else answer.step
-        if step is None and (goal.tools.angles != body.loading.tools.angles or carried.any()):
+        if step is None and moving:
             return None
         body.loading = goal
         return positions if step is None else positions + step + carried
@@ -203,11 +208,6 @@ class Newton:
         """How much of a step may be taken: an organ that nothing holds yet must not fly away."""
         longest = float(np.linalg.norm(direction, axis=1).max())
         return min(1.0, self._longest_step_mm / longest) if longest > 0.0 else 1.0
-
-    def _accuracy(self, residual: float, before: float, tolerance: float) -> float:
-        """How exactly a step is worth solving for, as the residual fell (Eisenstat and Walker 1996, choice 2)."""
-        wanted = min(_LOOSEST, 0.9 * (residual / before) ** 2) if np.isfinite(before) else _LOOSEST
-        return max(wanted, _ENOUGH * tolerance / residual)
 
     def _direction(
         self, positions: FloatArray, touches: Sequence[Touch], forces: FloatArray, accuracy: float

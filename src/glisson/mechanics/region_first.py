@@ -79,9 +79,7 @@ class RegionFirst:
     def _through(self, inner: LoadPath, region: CutRegion, path: LoadPath, goal: LoadState, way: Way) -> NewtonEnd:
         """Follow the survey's way in the region, and settle first the whole organ, then the region."""
         start, met = path.body.loading, np.zeros_like(path.positions)
-        for reach, known in way:
-            if reach < _FIRST_REACH:
-                continue
+        for reach, known in _stations(way):
             predicted = inner.positions + (known - met)[region.nodes]
             end = inner.follow(region.goal(start.towards(goal, reach), known), predicted, reach)
             if end.status is not Status.CONVERGED:
@@ -101,6 +99,11 @@ class RegionFirst:
             self.estimated_error = self.estimated_error + _ERROR_SHARE * correction
             path.history.extend(inner.history)
         return end
+
+
+def _stations(way: Way) -> Way:
+    """Of each share of the way the last that is known, from where tools bear well."""
+    return [(reach, known) for reach, known in dict(way).items() if reach >= _FIRST_REACH]
 
 
 def _path_within(path: LoadPath, region: CutRegion, newton: Newton) -> LoadPath:

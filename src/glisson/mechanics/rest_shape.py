@@ -22,12 +22,13 @@ from glisson.core.tools import Board
 from glisson.mechanics.body import scatter_blocks
 from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.elements import SurfaceQuadrature, quadrature
+from glisson.mechanics.inexact_newton import step_accuracy
 from glisson.mechanics.linear_solvers import LinearSolver, make_iterative_solver
 from glisson.mechanics.pattern import FreeSystem, Stiffness, block_pattern, pair_slots
 from glisson.mechanics.unsymmetric import solve_near_symmetric
 
 _ITERATION_LIMIT = 60
-_STEP_ACCURACY = 1e-3  # of the residual: enough for Newton steps that gain three digits each
+_LOOSEST = 0.03  # accuracy of a Newton step
 _WEIGHT_SHARES = (0.25, 0.5, 0.75, 1.0)
 _BED_STIFFNESS_SHARE = 10.0  # bed stiffness in Young's moduli per mm: a weight of 0.6 kPa sinks in by 0.01 mm
 _FACING = -0.5  # a surface point lies on a board when its outward normal is turned this much towards it
@@ -129,12 +130,13 @@ class _InverseProblem:
     def _balanced(self, positions: FloatArray, solver: LinearSolver, accuracy: float) -> FloatArray | None:
         """X for the present share of the weight, started from another share's; None where none is found."""
         force = self._unbalanced(positions)
-        reference = self._share * float(np.linalg.norm(self._weights))
+        goal, before = accuracy * self._share * float(np.linalg.norm(self._weights)), np.inf
         for _ in range(_ITERATION_LIMIT):
             size = float(np.linalg.norm(force))
-            if size <= accuracy * reference:
+            if size <= goal:
                 return positions
-            step = self._step(positions, force, solver)
+            step = self._step(positions, force, solver, step_accuracy(size, before, goal, _LOOSEST))
+            before = size
             found = None if step is None else self._search(positions, step, size)
             if found is None:
                 return None
@@ -170,7 +172,9 @@ class _InverseProblem:
         force[self._fixed] = 0.0
         return force
 
-    def _step(self, positions: FloatArray, force: FloatArray, solver: LinearSolver) -> FloatArray | None:
+    def _step(
+        self, positions: FloatArray, force: FloatArray, solver: LinearSolver, accuracy: float
+    ) -> FloatArray | None:
         """Newton's step (n, 3); None where the forward stiffness is not definite."""
         elasticity = self._elasticity.unloaded_at(positions)
         beds = self._bed_stiffness(positions)
@@ -184,7 +188,7 @@ class _InverseProblem:
             return None
         elasticity.add_rest_derivative(self._mesh.nodes, self._pattern, derivative)
         matrix = Stiffness(self._pattern, self._system, -derivative, self._mesh.nodes)
-        return solve_near_symmetric(matrix, solver, -force, _STEP_ACCURACY)
+        return solve_near_symmetric(matrix, solver, -force, accuracy)
 
     def _bed_stiffness(self, positions: FloatArray) -> FloatArray:
         """Blocks (b, 3, 3) of the beds."""
