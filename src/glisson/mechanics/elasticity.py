@@ -17,7 +17,7 @@ from glisson.mechanics.elements import ElementQuadrature, quadrature
 from glisson.mechanics.materials.law import Law, find_law
 from glisson.mechanics.pattern import BlockPattern, Index
 
-_CHUNK = 2048  # elements whose tangents and stiffness are held at once, small enough for a core's cache
+_CHUNK = 2048  # quadrature points whose tangents are held at once, small enough for a core's cache
 _CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -74,7 +74,8 @@ class Elasticity:
         material = materials[int(region)]
         law = find_law(material.law)
         law.check(material)
-        return [_Chunk(piece, law, material) for piece in np.array_split(elements, -(-len(elements) // _CHUNK))]
+        count = -(-len(elements) * self._quadrature.weights.shape[1] // _CHUNK)
+        return [_Chunk(piece, law, material) for piece in np.array_split(elements, count)]
 
     def energy(self, positions: FloatArray) -> float:
         """Strain energy in µJ at node positions (n, 3); infinite where an element is inverted."""
@@ -147,8 +148,7 @@ class Elasticity:
             apart = np.zeros((max(end - first, 0), 3, 3))
             for chunk in run:
                 found = tangents(self._gradients(positions, chunk.elements).reshape(-1, 3, 3), chunk)
-                parts = _element_stiffness(found, self._quadrature, chunk.elements, symmetric)
-                _scatter_stiffness(parts, pattern.slots, chunk.elements, blocks, apart, first, symmetric)
+                _add_stiffness(found, self._quadrature, pattern.slots, chunk.elements, blocks, apart, first, symmetric)
             return apart
 
         parts = list(_threads.map(add, self._runs, *zip(*shared, strict=True)))
@@ -200,40 +200,10 @@ def _add_forces(
                     forces[node, i] += weights[e, q] * value
 
 
-@njit(cache=True, nogil=True)
-def _element_stiffness(
-    tangents: FloatArray, quadrature: ElementQuadrature, elements: IntArray, symmetric: bool
-) -> FloatArray:
-    """Sum w ∇Nᵀ A ∇N of each element as (k, nodes, nodes, 3, 3); where `symmetric` only its rows a ≤ b are filled."""
-    gradients, weights = quadrature
-    points, size = gradients.shape[1], gradients.shape[2]
-    result = np.zeros((len(elements), size, size, 3, 3))
-    half = np.zeros((3, 3, 3))
-    for n in range(len(elements)):
-        e = elements[n]
-        for q in range(points):
-            tangent = tangents[n * points + q]
-            for b in range(size):
-                for i in range(3):
-                    for j in range(3):
-                        for k in range(3):
-                            value = 0.0
-                            for m in range(3):
-                                value += tangent[3 * i + j, 3 * k + m] * gradients[e, q, b, m]
-                            half[i, j, k] = weights[e, q] * value
-                for a in range(b + 1 if symmetric else size):
-                    for i in range(3):
-                        for k in range(3):
-                            value = 0.0
-                            for j in range(3):
-                                value += gradients[e, q, a, j] * half[i, j, k]
-                            result[n, a, b, i, k] += value
-    return result
-
-
-@njit(cache=True, nogil=True)
-def _scatter_stiffness(
-    parts: FloatArray,
+@njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz"})
+def _add_stiffness(
+    tangents: FloatArray,
+    quadrature: ElementQuadrature,
     slots: Index,
     elements: IntArray,
     blocks: FloatArray,
@@ -241,21 +211,47 @@ def _scatter_stiffness(
     first: int,
     symmetric: bool,
 ) -> None:
-    """Add to `blocks`, or to `apart` where the slot lies in its range from `first` on."""
-    end = first + len(apart)
+    """Add Σ w ∇Nᵀ T ∇N of each element to `blocks`, or to `apart` where the slot lies in its range from `first` on.
+
+    The innermost loops run over the nine entries of a block, so that they become vector instructions.
+    """
+    gradients, weights = quadrature
+    points, size = gradients.shape[1], gradients.shape[2]
+    matrix, half, tangent = np.zeros((size, size, 9)), np.zeros((3, 9)), np.zeros((3, 3, 9))
     for n in range(len(elements)):
-        for a in range(parts.shape[1]):
-            for b in range(parts.shape[2]):
-                slot = slots[elements[n], a, b]
-                target = apart[slot - first] if first <= slot < end else blocks[slot]
-                if symmetric and a > b:
+        e = elements[n]
+        matrix[:] = 0.0
+        for q in range(points):
+            point, weight = n * points + q, weights[e, q]
+            for m in range(3):
+                for j in range(3):
                     for i in range(3):
-                        for j in range(3):
-                            target[i, j] += parts[n, b, a, j, i]
-                else:
-                    for i in range(3):
-                        for j in range(3):
-                            target[i, j] += parts[n, a, b, i, j]
+                        for k in range(3):
+                            tangent[m, j, 3 * i + k] = weight * tangents[point, 3 * i + j, 3 * k + m]
+            for b in range(size):
+                x, y, z = gradients[e, q, b, 0], gradients[e, q, b, 1], gradients[e, q, b, 2]
+                for j in range(3):
+                    for c in range(9):
+                        half[j, c] = tangent[0, j, c] * x + tangent[1, j, c] * y + tangent[2, j, c] * z
+                for a in range(b + 1 if symmetric else size):
+                    u, v, w = gradients[e, q, a, 0], gradients[e, q, a, 1], gradients[e, q, a, 2]
+                    for c in range(9):
+                        matrix[a, b, c] += u * half[0, c] + v * half[1, c] + w * half[2, c]
+        for a in range(size):
+            for b in range(a if symmetric else 0, size):
+                _add_block(matrix[a, b], slots[e, a, b], False, blocks, apart, first)
+                if symmetric and a < b:
+                    _add_block(matrix[a, b], slots[e, b, a], True, blocks, apart, first)
+
+
+@njit(cache=True, nogil=True)
+def _add_block(
+    values: FloatArray, slot: int, transposed: bool, blocks: FloatArray, apart: FloatArray, first: int
+) -> None:
+    target = apart[slot - first] if first <= slot < first + len(apart) else blocks[slot]
+    for i in range(3):
+        for k in range(3):
+            target[i, k] += values[3 * k + i] if transposed else values[3 * i + k]
 
 
 @njit(cache=True, nogil=True)

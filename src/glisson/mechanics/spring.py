@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.linalg import LinAlgError, cho_factor
+from scipy.linalg.lapack import dpotri
 
 from glisson.core.arrays import FloatArray
 
@@ -20,10 +21,11 @@ class Spring:
     def compliance(self) -> FloatArray | None:
         """The inverse (k, k) in mm/mN; None where the stiffness is not positive definite."""
         try:
-            factor = cho_factor(self.stiffness, check_finite=False)
+            factor, _ = cho_factor(self.stiffness, lower=True, check_finite=False)
         except LinAlgError:
             return None
-        inverse: FloatArray = cho_solve(factor, np.eye(len(self.stiffness)), check_finite=False)
+        half, _ = dpotri(factor, lower=True)
+        inverse: FloatArray = np.tril(half) + np.tril(half, -1).T
         return inverse
 
     def candidates(self, near: bool) -> Iterator["Spring"]:
