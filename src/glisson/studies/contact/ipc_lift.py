@@ -17,7 +17,7 @@ from glisson.core.units import newtons_from_millinewtons
 from glisson.mechanics.body import Body
 from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.elements import surface_quadrature
-from glisson.mechanics.linear_solvers import make_direct_solver
+from glisson.mechanics.linear_solvers import make_iterative_solver
 from glisson.mechanics.loads import fixed_unknowns, gravity_forces
 from glisson.mechanics.newton import Newton, NewtonSettings
 from glisson.mechanics.numbering import numbering
@@ -66,7 +66,7 @@ class _Driver:
         fixed = fixed_unknowns(model, scenario.stages[0].fixed)
         surface = surface_quadrature(mesh.nodes, mesh, 1)
         self._body = Body(Elasticity(mesh, model.materials, mesh.nodes), surface, (), fixed, [self._part])
-        self.newton = Newton(self._body, make_direct_solver(), _SETTINGS)
+        self.newton = Newton(self._body, make_iterative_solver(), _SETTINGS)
         self._positions = np.array(mesh.nodes)
 
     def run(self) -> tuple[Deformation, tuple[FloatArray, ...]]:

@@ -59,6 +59,7 @@ class IpcTools:
         self._barrier = ipctk.BarrierPotential(_RANGE_MM, stiffness, use_physical_barrier=True)
         self._rubbing = ipctk.FrictionPotential(_STICK_MM)
         self._lagged: Any = ipctk.TangentialCollisions()
+        self._last: tuple[FloatArray, Any] | None = None
 
     def energy(self, positions: FloatArray) -> float:
         """Potential in µJ; infinite where the organ cuts a tool."""
@@ -128,11 +129,14 @@ class IpcTools:
         return np.asfortranarray(places - self._start)
 
     def _collisions(self, places: FloatArray) -> Any:
-        collisions = self._ipctk.NormalCollisions()
-        collisions.use_area_weighting = True
-        collisions.collision_set_type = self._ipctk.NormalCollisions.CollisionSetType.IMPROVED_MAX_APPROX
-        collisions.build(self._mesh, places, _RANGE_MM)
-        return collisions
+        """What is near; energy, forces and stiffness are mostly asked for at the same places."""
+        if self._last is None or not np.array_equal(self._last[0], places):
+            collisions = self._ipctk.NormalCollisions()
+            collisions.use_area_weighting = True
+            collisions.collision_set_type = self._ipctk.NormalCollisions.CollisionSetType.IMPROVED_MAX_APPROX
+            collisions.build(self._mesh, places, _RANGE_MM)
+            self._last = places, collisions
+        return self._last[1]
 
 
 def _in_tool(tool: RigidTool, surface: TriangleSurface) -> FloatArray:
