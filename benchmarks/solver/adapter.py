@@ -1,35 +1,19 @@
 """What every engine's script does around its solve: `python ENGINE.py MESH OUT`.
 
-OUT.npz gets the displacement (n, 3) in mm, OUT.json what was measured. The solve is timed whole, from the engine's mesh
+The solve is timed whole, from the engine's mesh
 to the displacement, after imports, reading the mesh, and one solve of the same problem on a tiny mesh, which compiles
 and loads what is needed.
 """
 
-import json
-import os
-import resource
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from measuring import Solution, peak_mb, resident_mb, write
 from problem import PATCH_RADIUS_MM, Problem, load_problem
-
-
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """Displacement (n, 3) in mm and the number of Newton iterations (linear solves) of all load steps."""
-
-    displacement: NDArray[np.float64]
-    iterations: int
-
-
-class Failed(Exception):
-    """The engine gave no solution; the text says why."""
 
 
 def run(version: str, read: Callable[[Problem], Any], solve: Callable[[Problem, Any], Solution]) -> None:
@@ -45,19 +29,6 @@ def run(version: str, read: Callable[[Problem], Any], solve: Callable[[Problem, 
     write(out, version, solution, seconds, before, peak_mb())
 
 
-def write(out: Path, version: str, solution: Solution, seconds: float, before_mb: float, peak: float) -> None:
-    """Write OUT.npz and OUT.json."""
-    np.savez(out.with_suffix(".npz"), displacement=solution.displacement)
-    values = {
-        "version": version,
-        "seconds": seconds,
-        "iterations": solution.iterations,
-        "memory_mb": peak,
-        "memory_before_mb": before_mb,
-    }
-    out.with_suffix(".json").write_text(json.dumps(values))
-
-
 def tiny_problem(order: int) -> Problem:
     """Five cubes in a row along x, each of six tetrahedra (Kuhn), clamped at one end and carried at the other."""
     side = PATCH_RADIUS_MM
@@ -71,14 +42,3 @@ def tiny_problem(order: int) -> Problem:
         nodes = np.concatenate([nodes, nodes[unique].mean(axis=1)])
     x = nodes[:, 0]
     return Problem(nodes, tetrahedra, np.flatnonzero(x == 0.0), np.flatnonzero(x == x.max()))
-
-
-def resident_mb() -> float:
-    """Memory of this process now in MB."""
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
-    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
-
-
-def peak_mb() -> float:
-    """The most memory that this process had, in MB."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6

@@ -12,8 +12,9 @@ import basix.ufl
 import dolfinx
 import numpy as np
 import ufl
-from adapter import Failed, Solution, peak_mb, resident_mb, tiny_problem, write
+from adapter import tiny_problem
 from dolfinx.fem import petsc as assembling
+from measuring import Failed, Solution, peak_mb, resident_mb, write
 from mpi4py import MPI
 from petsc4py import PETSc
 from problem import BULK_KPA, SHEAR_KPA, STEPS, TOLERANCE, WEIGHT_MN_MM3, Problem, load_problem

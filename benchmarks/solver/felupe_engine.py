@@ -2,7 +2,8 @@
 
 import felupe
 import numpy as np
-from adapter import Solution, run
+from adapter import run
+from measuring import Solution
 from newton import newton
 from problem import BULK_KPA, SHEAR_KPA, WEIGHT_MN_MM3, Problem
 from scipy.sparse import csr_matrix

@@ -1,7 +1,8 @@
 """Glisson's quasi-static solver, in its own environment."""
 
 import numpy as np
-from adapter import Failed, Solution, run
+from adapter import run
+from measuring import Failed, Solution
 from problem import DENSITY_KG_M3, LIFT_MM, POISSON_RATIO, TOLERANCE, YOUNG_MODULUS_KPA, Problem
 
 import glisson

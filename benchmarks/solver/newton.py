@@ -7,7 +7,7 @@ goes into the right-hand side, so that no element is crushed by it.
 from typing import Protocol
 
 import numpy as np
-from adapter import Failed, Solution
+from measuring import Failed, Solution
 from numpy.typing import NDArray
 from problem import STEPS, TOLERANCE, Problem
 from pypardiso import PyPardisoSolver

@@ -3,7 +3,8 @@
 import netgen.meshing
 import ngsolve
 import numpy as np
-from adapter import Failed, Solution, run
+from adapter import run
+from measuring import Failed, Solution
 from problem import BULK_KPA, SHEAR_KPA, STEPS, TOLERANCE, WEIGHT_MN_MM3, Problem
 from scipy.spatial import cKDTree
 

@@ -9,36 +9,38 @@ from pathlib import Path
 from glisson.cli.command import Command
 from glisson.cli.console import Answer
 from glisson.cli.progress import StageLines
-from glisson.framework.solver_benchmark import RESULTS, Row, SolverBenchmark
-from glisson.framework.solver_plot import PLOT, draw_cost
+from glisson.framework.benchmark import RESULTS, Benchmark, Row
+from glisson.framework.benchmark_plot import PLOT, draw_cost
 
 _OURS = "Glisson"
-_HEADING = "  engine                  seconds  ratio  its     MB  residual difference"
+_HEADING = "  engine                  seconds  ratio  its     MB  residual difference  moved (mm)"
 
 
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "benchmark",
-        choices=("solver",),
-        help="solver: the same hyperelastic problem on the same meshes by Glisson and by other engines",
+        choices=("solver", "lift"),
+        help="solver: the same hyperelastic problem on the same meshes by Glisson and by other engines; "
+        "lift: the two-stage lever lift with friction",
     )
-    parser.add_argument("--quick", action="store_true", help="one small problem instead of all; about a minute")
+    parser.add_argument("--quick", action="store_true", help="one small problem instead of all; some minutes")
     parser.add_argument("--out", metavar="DIR", help="where results go (default: studies/benchmark-NAME)")
 
 
 def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
     out = Path(arguments.out or f"studies/benchmark-{arguments.benchmark}")
-    rows = SolverBenchmark(out, arguments.quick, lines).run()
+    benchmark = Benchmark(arguments.benchmark, out, arguments.quick, lines)
+    rows = benchmark.run()
     draw_cost(rows, out / PLOT)
-    text = [*_tables(rows), f"results   {out / RESULTS} and {out / PLOT}"]
+    text = [*_tables(rows), f"difference: {benchmark.difference}", f"results   {out / RESULTS} and {out / PLOT}"]
     return Answer({"rows": [asdict(row) for row in rows]}, "\n".join(text))
 
 
 def _tables(rows: Sequence[Row]) -> Iterator[str]:
-    """A table for each mesh, fastest first; ratios are to the fastest other engine."""
+    """A table for each mesh, fastest first; ratios are to the fastest engine that is not Glisson."""
     for (element, elements), group in groupby(rows, lambda row: (row.element, row.elements)):
         measured = sorted(group, key=lambda row: (row.seconds is None, row.seconds or 0.0))
-        peers = [row.seconds for row in measured if row.seconds is not None and row.engine != _OURS]
+        peers = [row.seconds for row in measured if row.seconds is not None and not row.engine.startswith(_OURS)]
         yield f"{elements:,} {element}"
         yield _HEADING
         yield from (f"  {_line(row, peers[0] if peers else None)}" for row in measured)
@@ -49,15 +51,16 @@ def _line(row: Row, fastest: float | None) -> str:
         return f"{row.engine:22s} {'–':>8s}  {row.reason}"
     ratio = "–" if fastest is None else f"{row.seconds / fastest:.2f}"
     memory, residual, difference = row.memory_mb or 0.0, row.residual or 0.0, row.difference or 0.0
+    moved = "" if row.moved_mm is None else f"{row.moved_mm:11.2f}"
     return (
         f"{row.engine:22s} {row.seconds:8.2f} {ratio:>6s} {row.iterations or '–':>4} {memory:6.0f} "
-        f"{residual:9.1e} {difference:10.1e}"
-    )
+        f"{residual:9.1e} {difference:10.1e} {moved}"
+    ).rstrip()
 
 
 COMMAND = Command(
     "benchmark",
-    "  glisson benchmark solver --quick\n  glisson benchmark solver --json > solver.json",
+    "  glisson benchmark solver --quick\n  glisson benchmark lift --json > lift.json",
     _add_arguments,
     _run,
     ("rows",),

@@ -1,4 +1,4 @@
-"""The lever lift as a deck: an organ of neo-Hookean C3D10 elements, board and lever, CalculiX's own contact.
+"""The lever lift as a deck: an organ of neo-Hookean elements, board and lever, CalculiX's own contact.
 
 Steps: gravity on the board (rest → A), the lever in steps of a few degrees with sticky contact (A → B',
 stage 1), then friction lowered in steps with the lever held (B' → B, stage 2). CalculiX has no cohesion:
@@ -48,7 +48,7 @@ class LiftSettings:
 
 @dataclass(frozen=True, eq=False)
 class LiftOrgan:
-    """T10 mesh of the rest shape on the board y = 0, Young's moduli (m,) in kPa, the corner nodes held."""
+    """Mesh (T4 or T10) of the rest shape on the board y = 0, Young's moduli (m,) in kPa, the corner nodes held."""
 
     mesh: TetMesh
     young_moduli_kpa: FloatArray
@@ -112,7 +112,9 @@ def _add_organ(deck: Deck, organ: LiftOrgan) -> None:
 
 
 def with_middles(mesh: TetMesh, corners: IntArray) -> IntArray:
-    """Boundary corner nodes, and the middle nodes of boundary edges between two of them."""
+    """Boundary corner nodes, and the middle nodes (where there are any) of boundary edges between two of them."""
+    if not mesh.is_quadratic:
+        return np.sort(corners)
     chosen = np.zeros(len(mesh.nodes), dtype=bool)
     chosen[corners] = True
     outer = np.zeros(len(mesh.nodes), dtype=bool)

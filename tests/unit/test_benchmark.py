@@ -1,4 +1,4 @@
-"""The solver benchmark's runner with engines that only pretend, and the judge of the real ones against closed forms."""
+"""The benchmarks' runner with engines that only pretend, and the judges of the real ones against closed forms."""
 
 import json
 import os
@@ -12,16 +12,16 @@ import glisson as package
 from conftest import ROOT
 from glisson.core.errors import BadInput
 from glisson.core.protocols import silent
-from glisson.framework import solver_benchmark
-from glisson.framework.benchmarks import benchmarks_folder, run_script
+from glisson.framework import benchmark
+from glisson.framework.benchmark import RESULTS, Benchmark
+from glisson.framework.benchmark_plot import PLOT, fitted_exponent
+from glisson.framework.benchmark_scripts import benchmarks_folder, run_script
 from glisson.framework.pipeline import Unheard
-from glisson.framework.solver_benchmark import RESULTS, SolverBenchmark
-from glisson.framework.solver_plot import PLOT, fitted_exponent
 
 SCRIPTS = {
     "meshes.py": "import sys, pathlib; pathlib.Path(sys.argv[3]).write_text(sys.argv[1])",
     # The judge takes what the engine says of itself for its residual.
-    "residual.py": """
+    "judge.py": """
         import json, pathlib, sys
         told = [float(pathlib.Path(name).read_text()) for name in sys.argv[3:]]
         found = [{"dofs": 12, "residual": value, "difference": value - min(told)} for value in told]
@@ -29,15 +29,19 @@ SCRIPTS = {
     """,
     "engine.py": """
         import json, pathlib, sys
+        from constant import ITERATIONS
         residual, mesh, out = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3])
         out.with_suffix(".npz").write_text(residual)
-        values = dict(version="7", seconds=float(pathlib.Path(mesh).read_text()) ** 1.5, iterations=4, memory_mb=100.0)
+        values = dict(version="7", seconds=float(pathlib.Path(mesh).read_text()) ** 1.5, iterations=ITERATIONS,
+                      memory_mb=100.0)
         out.with_suffix(".json").write_text(json.dumps(values))
     """,
     "broken.py": "raise RuntimeError('no such element')",
     "slow.py": "import time; time.sleep(60)",
     "engines.toml": """
         tolerance = 1e-6
+        difference = "to the best"
+        mesh_source = []
         [[problems]]
         element = "T4"
         elements = [4, 9, 100]
@@ -79,21 +83,30 @@ SCRIPTS = {
 @pytest.fixture
 def pretended(tmp_path, monkeypatch):
     """Scripts of engines that only pretend, in the place of `benchmarks/solver`."""
-    folder = tmp_path / "checkout" / "benchmarks" / "solver"
+    checkout = tmp_path / "checkout" / "benchmarks"
+    folder = checkout / "solver"
     folder.mkdir(parents=True)
+    (checkout / "shared").mkdir()
+    (checkout / "shared" / "constant.py").write_text("ITERATIONS = 4")
     for name, text in SCRIPTS.items():
         (folder / name).write_text(textwrap.dedent(text))
-    monkeypatch.setattr(solver_benchmark, "benchmarks_folder", lambda name: folder)
+    monkeypatch.setattr(benchmark, "benchmarks_folder", lambda name: checkout / name)
     return folder
 
 
 @pytest.fixture
 def scripts(monkeypatch):
-    """The real scripts can be imported."""
-    monkeypatch.syspath_prepend(str(ROOT / "benchmarks" / "solver"))
-    yield
-    for name in ("problem", "adapter", "residual", "meshes", "glisson_engine"):
-        sys.modules.pop(name, None)
+    """Imports the real scripts of a benchmark."""
+
+    def of(name):
+        for folder in ("shared", name):
+            monkeypatch.syspath_prepend(str(ROOT / "benchmarks" / folder))
+
+    before = set(sys.modules)
+    yield of
+    for name in set(sys.modules) - before:
+        if str(ROOT / "benchmarks") in str(getattr(sys.modules[name], "__file__", "")):
+            del sys.modules[name]
 
 
 class Heard(Unheard):
@@ -111,7 +124,7 @@ class Heard(Unheard):
 
 
 def test_every_engine_has_a_row_and_whoever_gave_no_answer_says_why(pretended, tmp_path):
-    rows = SolverBenchmark(tmp_path / "out", quick=False).run()
+    rows = Benchmark("solver", tmp_path / "out", quick=False).run()
     assert [(row.engine, row.elements) for row in rows] == [
         *((name, 4) for name in ("exact", "rough", "absent", "broken", "slow")),
         *((name, 9) for name in ("exact", "rough", "absent", "broken")),
@@ -131,24 +144,24 @@ def test_every_engine_has_a_row_and_whoever_gave_no_answer_says_why(pretended, t
 def test_an_interrupted_benchmark_goes_on_and_a_finished_one_begins_anew(pretended, tmp_path):
     out = tmp_path / "out"
     with pytest.raises(KeyboardInterrupt):
-        SolverBenchmark(out, True, Heard(stop_at="rough")).run()
+        Benchmark("solver", out, True, Heard(stop_at="rough")).run()
     assert not (out / RESULTS).exists()
     heard = Heard()
-    SolverBenchmark(out, True, heard).run()
+    Benchmark("solver", out, True, heard).run()
     assert heard.kept == ["exact, 9 T4"]
     assert "rough, 9 T4" in heard.run
     assert not any(words.startswith("mesh") for words in heard.run)
     heard = Heard()
-    SolverBenchmark(out, True, heard).run()
+    Benchmark("solver", out, True, heard).run()
     assert heard.kept == []
 
 
 def test_a_changed_engine_is_measured_anew(pretended, tmp_path):
     with pytest.raises(KeyboardInterrupt):
-        SolverBenchmark(tmp_path / "out", True, Heard(stop_at="rough")).run()
+        Benchmark("solver", tmp_path / "out", True, Heard(stop_at="rough")).run()
     (pretended / "engine.py").write_text((pretended / "engine.py").read_text() + "\n# changed\n")
     heard = Heard()
-    SolverBenchmark(tmp_path / "out", True, heard).run()
+    Benchmark("solver", tmp_path / "out", True, heard).run()
     assert heard.kept == []
 
 
@@ -161,13 +174,13 @@ def test_an_interruption_ends_the_process_too(tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run_script([sys.executable, "-c", script], log, 60.0, interrupt, "running")
+        run_script([sys.executable, "-c", script], log, 60.0, interrupt, "running", {})
     with pytest.raises(ProcessLookupError):
         os.kill(int(log.read_text()), 0)
 
 
 def test_a_program_that_cannot_be_started_is_a_reason(tmp_path):
-    reason = run_script([str(tmp_path / "nothing")], tmp_path / "log", 1.0, silent, "running")
+    reason = run_script([str(tmp_path / "nothing")], tmp_path / "log", 1.0, silent, "running", {})
     assert "could not be started: No such file" in reason
 
 
@@ -215,14 +228,19 @@ def _lateral_stretch(stretch, shear, bulk):
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_judge_against_uniaxial_stretch_and_weight(scripts, order):
+    scripts("solver")
     from adapter import tiny_problem
+    from judge import TISSUE
+    from law import forces
     from problem import BULK_KPA, SHEAR_KPA, WEIGHT_MN_MM3
-    from residual import forces
 
     problem = tiny_problem(order)
     stretch = 1.3
     lateral, stress = _lateral_stretch(stretch, SHEAR_KPA, BULK_KPA)
-    internal, external = forces(problem, problem.nodes * (np.array([stretch, lateral, lateral]) - 1.0))
+    displacement = problem.nodes * (np.array([stretch, lateral, lateral]) - 1.0)
+    found = forces(TISSUE, problem.nodes, problem.tetrahedra, displacement, problem.nodes)
+    internal, external = found.internal, found.external
+    assert found.least_volume_ratio == pytest.approx(stretch * lateral**2)
     end = problem.nodes[:, 0] == problem.nodes[:, 0].max()
     between = (problem.nodes[:, 0] > 0.0) & ~end
     scale = stress * 20.0**2
@@ -233,9 +251,10 @@ def test_judge_against_uniaxial_stretch_and_weight(scripts, order):
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_glisson_as_an_engine_satisfies_the_judge(scripts, order):
+    scripts("solver")
     from adapter import tiny_problem
     from glisson_engine import _read, _solve
-    from residual import judge
+    from judge import judge
 
     problem = tiny_problem(order)
     solution = _solve(problem, _read(problem))
@@ -250,6 +269,7 @@ def test_glisson_as_an_engine_satisfies_the_judge(scripts, order):
 
 
 def test_meshes_are_the_same_everywhere(scripts):
+    scripts("solver")
     from meshes import LATTICES, ellipsoid_mesh, held_nodes
     from problem import SEMI_AXES_MM
 
@@ -260,3 +280,23 @@ def test_meshes_are_the_same_everywhere(scripts):
         clamped, carried = held_nodes(mesh)
         assert len(clamped) > 100
         assert len(carried) > 10
+
+
+def test_a_lift_satisfies_its_judge_and_a_wrong_one_does_not(scripts, tmp_path):
+    scripts("lift")
+    from glisson_engine import _solve
+    from judge import judge
+    from meshes import main
+    from problem import load_problem
+
+    main(2_000, "T4", tmp_path / "mesh.npz")
+    problem = load_problem(tmp_path / "mesh.npz")
+    lifted = _solve("quasi-static", "T4", problem.corner_mesh).displacement
+    wrong, inverted = lifted.copy(), lifted.copy()
+    wrong[problem.inside[0]] += 1.0
+    inverted[problem.inside[0]] += 100.0
+    good, bad, none = judge(problem, [lifted, wrong, inverted])
+    assert good["residual"] <= 1e-6
+    assert good["moved_mm"] > 10.0
+    assert (good["difference"], none["residual"]) == (0.0, None)
+    assert bad["residual"] > 1e-3

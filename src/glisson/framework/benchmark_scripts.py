@@ -4,7 +4,7 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import glisson
@@ -16,7 +16,7 @@ _GRACE_S = 5.0
 
 
 def benchmarks_folder(name: str) -> Path:
-    """The folder of one benchmark's scripts.
+    """The folder of one benchmark's scripts, or of those that all share.
 
     Raises:
         BadInput: Glisson was installed from a wheel, which has none.
@@ -30,8 +30,17 @@ def benchmarks_folder(name: str) -> Path:
     return folder
 
 
-def run_script(command: Sequence[str], log: Path, time_limit_s: float, progress: Progress, words: str) -> str | None:
+def run_script(
+    command: Sequence[str],
+    log: Path,
+    time_limit_s: float,
+    progress: Progress,
+    words: str,
+    surroundings: Mapping[str, str],
+) -> str | None:
     """Run a command to its end with its output in `log`; why it gave nothing, or None where it ended well.
+
+    `surroundings` are environment variables beside those of this process.
 
     It and whatever it started are ended when it takes too long and when this process is interrupted.
     """
@@ -39,7 +48,12 @@ def run_script(command: Sequence[str], log: Path, time_limit_s: float, progress:
     with log.open("wb") as output:
         try:
             process = subprocess.Popen(
-                command, stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=output,
+                start_new_session=True,
+                env={**os.environ, **surroundings},
             )
         except OSError as error:
             return f"{command[0]} could not be started: {error.strerror}"

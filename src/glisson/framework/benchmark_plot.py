@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import NullFormatter, StrMethodFormatter
 
-from glisson.framework.solver_benchmark import Row
+from glisson.framework.benchmark import Row
 from glisson.io.atomic import atomic_path
 
 PLOT = "cost.png"

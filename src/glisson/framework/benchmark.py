@@ -1,7 +1,7 @@
-"""`benchmark solver`: one problem, one stopping rule, every engine in a process of its own, one neutral judge.
+"""A benchmark: one problem on several meshes, every engine in a process of its own, one neutral judge.
 
-What is run stands in `benchmarks/solver/engines.toml`. An engine's answer is kept until the benchmark has come to its
-end, so that an interrupted one goes on where it was; a finished one is measured anew.
+What is run stands in `benchmarks/NAME/engines.toml`, beside the scripts. An engine's answer is kept until the benchmark
+has come to its end, so that an interrupted one goes on where it was; a finished one is measured anew.
 """
 
 import json
@@ -18,7 +18,7 @@ from typing import Any
 
 from glisson.core.errors import StageFailed
 from glisson.core.status import Status
-from glisson.framework.benchmarks import benchmarks_folder, run_script
+from glisson.framework.benchmark_scripts import benchmarks_folder, run_script
 from glisson.framework.hashing import content_hash, source_hash
 from glisson.framework.lock import exclusive
 from glisson.framework.pipeline import Listener, Unheard
@@ -42,10 +42,10 @@ class Engine:
 
 @dataclass(frozen=True)
 class Row:
-    """One engine on one mesh; where it gave no answer `seconds` is None and `reason` says why.
+    """One engine on one mesh of (about) `elements`; where it gave no answer `seconds` is None and `reason` says why.
 
-    `memory_mb` is the most that the process had, `memory_before_mb` what it had before the solve. `residual` is the
-    neutral judge's; `difference` is relative in L2, to the answer with the smallest residual on the same mesh.
+    `memory_mb` is the most that the process had, `memory_before_mb` what it had before the solve. `residual` and
+    `difference` are the neutral judge's, which also tells how far a lift has moved the tumour.
     """
 
     engine: str
@@ -59,22 +59,26 @@ class Row:
     memory_before_mb: float | None = None
     residual: float | None = None
     difference: float | None = None
+    moved_mm: float | None = None
     reason: str | None = None
 
 
 @dataclass(frozen=True)
 class _Plan:
-    """The problems as (element, elements), the engines, and the residual an answer may have."""
+    """The problems as (element, elements), the engines, the residual an answer may have, and more of `engines.toml`."""
 
     problems: tuple[tuple[str, int], ...]
     engines: tuple[Engine, ...]
     tolerance: float
+    difference: str
+    mesh_source: tuple[str, ...]
 
 
-class SolverBenchmark:
+class Benchmark:
     """Measures every engine on every mesh that it can take.
 
     Args:
+        name: its folder in `benchmarks`.
         out: folder of the results; meshes are kept there too.
         quick: only the one problem that is quickly done.
 
@@ -82,10 +86,15 @@ class SolverBenchmark:
         BadInput: this Glisson has no benchmarks.
     """
 
-    def __init__(self, out: Path, quick: bool, listener: Listener | None = None, folder: Path | None = None) -> None:
-        self._folder = benchmarks_folder("solver") if folder is None else folder
+    def __init__(self, name: str, out: Path, quick: bool, listener: Listener | None = None) -> None:
+        self._folder, self._shared = benchmarks_folder(name), benchmarks_folder("shared")
         self._out, self._listener = out, listener or Unheard()
         self._plan = _read_plan(self._folder, quick)
+
+    @property
+    def difference(self) -> str:
+        """What the rows' `difference` means."""
+        return self._plan.difference
 
     def run(self) -> list[Row]:
         """All rows, which are also written to `benchmark.json`."""
@@ -108,7 +117,7 @@ class SolverBenchmark:
         return (row if row.seconds is None else self._accepted(replace(row, **next(judged))) for row in rows)
 
     def _mesh(self, element: str, elements: int) -> Path:
-        path = self._out / _MESHES / f"{elements}-{element}-{self._source(with_glisson=False)}.npz"
+        path = self._out / _MESHES / f"{elements}-{element}-{self._source(*self._plan.mesh_source)}.npz"
         words = f"mesh of {elements:,} {element}"
         if not path.exists():
             path.parent.mkdir(exist_ok=True)
@@ -143,7 +152,7 @@ class SolverBenchmark:
         if not answers:
             return []
         out = self._out / _RUNS / "judged.json"
-        command = [sys.executable, str(self._folder / "residual.py"), str(mesh), str(out)]
+        command = [sys.executable, str(self._folder / "judge.py"), str(mesh), str(out)]
         command += [str(answer.with_suffix(".npz")) for answer in answers]
         reason = self._timed("judge", "the answers are there", command, out.with_suffix(".log"), _SET_UP_LIMIT_S)
         if reason is not None:
@@ -162,18 +171,17 @@ class SolverBenchmark:
     def _timed(self, words: str, why: str, command: Sequence[str], log: Path, limit_s: float) -> str | None:
         progress = self._listener.begun(words, why)
         start = time.monotonic()
-        reason = run_script(command, log, limit_s, progress, "running")
+        reason = run_script(command, log, limit_s, progress, "running", {"PYTHONPATH": str(self._shared)})
         self._listener.ended(words, time.monotonic() - start)
         return reason
 
     def _answer(self, row: Row) -> Path:
         """Where an engine's answer on a mesh is, without a suffix; scripts that changed have other answers."""
-        key = f"{row.engine} {row.element} {row.elements} {self._source(with_glisson=True)}"
+        key = f"{row.engine} {row.element} {row.elements} {self._source('glisson')}"
         return self._out / _RUNS / blake2b(key.encode(), digest_size=8).hexdigest()
 
-    def _source(self, with_glisson: bool) -> str:
-        packages = ("glisson",) if with_glisson else ("glisson.core", "glisson.preoperative.lattice")
-        text = content_hash(self._folder) + source_hash(*packages)
+    def _source(self, *packages: str) -> str:
+        text = content_hash(self._folder) + content_hash(self._shared) + source_hash(*packages)
         return blake2b(text.encode(), digest_size=4).hexdigest()
 
     def _filled(self, word: str) -> str:
@@ -190,4 +198,6 @@ def _read_plan(folder: Path, quick: bool) -> _Plan:
         if not quick or elements == problem.get("quick")
     ]
     engines = [Engine(**(engine | {"command": tuple(engine["command"])})) for engine in values["engines"]]
-    return _Plan(tuple(problems), tuple(engines), values["tolerance"])
+    return _Plan(
+        tuple(problems), tuple(engines), values["tolerance"], values["difference"], tuple(values["mesh_source"])
+    )
