@@ -150,4 +150,6 @@ class StageRunner:
 
 def _sentence(stage: Stage, end: NewtonEnd) -> str:
     reason = end.reason or end.status.sentence.rstrip(".").lower()
-    return f"Stage {stage.name!r} did not reach equilibrium (relative residual {end.residual:.1e}): {reason}."
+    # A load step that could not even be begun has no residual.
+    left = f" (relative residual {end.residual:.1e})" if np.isfinite(end.residual) else ""
+    return f"Stage {stage.name!r} did not reach equilibrium{left}: {reason}."
