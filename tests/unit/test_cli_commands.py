@@ -89,6 +89,11 @@ def test_a_scenario_that_a_person_changed_is_kept(case: Path, glisson: Glisson) 
     assert code == 0
     assert said["status"] == "converged"
     assert (case / SCENARIO).read_text() == text
+    settings = (case / SETTINGS).read_text()
+    code, said = glisson("simulate", case, "--scenario.angle-deg", "9")
+    assert (code, said["status"]) == (2, "bad_input")
+    assert "scenario have no effect, because scenario.toml was given or corrected by hand" in said["message"]
+    assert (case / SETTINGS).read_text() == settings
 
 
 def test_a_solve_that_fails_is_told_and_leaves_older_results(case: Path, glisson: Glisson) -> None:

@@ -54,6 +54,15 @@ def test_elements_of_the_tumour_lie_in_it(built):
     assert mesh.corner_volumes_mm3[tumour].sum() == pytest.approx(4.0 / 3.0 * np.pi * 14.0**3, rel=0.35)
 
 
+def test_a_material_of_no_region_is_refused(built):
+    organ, _ = built
+    materials = {"liver": Material("linear-elastic", 13.0, 0.4), "tumor1": Material("linear-elastic", 20.0, 0.4)}
+    mesher = Mmg(MmgParameters(edge_length_mm=30.0, envelope_mm=3.0))
+    extractor = MarchingCubes(MarchingCubesParameters(edge_length_mm=8.0))
+    with pytest.raises(BadInput, match=r"no region 'tumor1' to be of a material; there are \['liver'\]"):
+        build_model(organ, None, None, extractor, mesher, ModelSettings(materials))
+
+
 def test_tumour_is_stiffer_unless_told_otherwise(built):
     _, (model, _) = built
     assert model.materials[1].young_modulus_kpa == 3.0 * model.materials[0].young_modulus_kpa

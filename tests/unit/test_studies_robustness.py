@@ -80,6 +80,8 @@ def outcome(number: int) -> Outcome:
         return Outcome({"events": []}, {}, Status.STAGNATED, "It did not reach equilibrium.")
     if number == 1:
         return Outcome({}, {}, None, "Its process ended with signal 9, probably for want of memory.")
+    if number == 9:
+        return Outcome({}, {}, Status.BAD_INPUT, "The lever would cut into a part that is held fast.")
     if number in (2, 3):
         values["events"] = [{"kind": "lost_contact", "tool": "lever", "at_deg": 31.0}]
     if number == 4:
@@ -94,15 +96,17 @@ def test_outcomes_are_counted_as_they_are():
     done = {point.key: outcome(number) for number, point in enumerate(study.points({})[:10])}
     found = study.conclude({}, done)
     values = found.values
-    assert values["cases"] == 10
+    assert values["cases"] == 9
     assert values["unfinished"] == 1
-    assert values["converged"] == 0.8
+    assert values["converged"] == 7 / 9
+    assert [row["status"] for row in values["impossible"]] == ["bad_input"]
     assert values["slipped_off"] == 2
     assert values["inverted"] == 1
     assert values["penetrated"] == 1
     assert [row["status"] for row in values["failed"]] == ["stagnated", None]
     assert {"member", "young_modulus_kpa", "events", "seconds", "iterations", "least_gap_mm"} <= set(values["rows"][0])
-    assert "80.0 %" in found.text
+    assert "77.8 %" in found.text
+    assert "would cut into" in found.text
     assert "signal 9" in found.text
     assert set(found.files) == {"rows.csv", "report.html"}
     assert b"not for clinical use" in found.files["report.html"]
@@ -134,3 +138,10 @@ def test_the_command_counts(glisson: Glisson, tmp_path, monkeypatch) -> None:
     assert said["node_gap_mm"] > 50.0
     assert said["rows"][0]["member"] == draw_case(5, 0).member
     assert (tmp_path / "s/report.html").is_file()
+
+
+def test_an_option_of_another_study_is_refused(glisson: Glisson, tmp_path) -> None:
+    code, said = glisson("study", "region", "--seed", "5", "--out", tmp_path / "s")
+    assert (code, said["status"]) == (2, "bad_input")
+    assert said["message"] == "--seed is for the study lift-robustness or contact; region does not have it."
+    assert not (tmp_path / "s").exists()

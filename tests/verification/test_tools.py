@@ -121,13 +121,22 @@ def test_distances_to_a_slotted_board_are_those_to_many_points_of_it() -> None:
     assert np.abs(found - nearest)[found > 0.0].max() < 0.1
 
 
+def test_a_tool_that_never_touches_is_told() -> None:
+    bar = Cylinder("bar", np.array([30.0, -20.0, 40.0]), np.array([30.0, 50.0, 40.0]), 4.0)
+    down = Stage("press", STICKY, gravity=False, fixed=("left",), motions=(ToolMotion("bar", (0.0, 0.0, -10.0)),))
+    answer = _solved([bar], down)
+    assert answer.status is Status.BAD_INPUT
+    assert answer.message == "Tool 'bar' never touched the organ: it ends 11.0 mm away; move it further."
+
+
 def test_a_tool_that_is_driven_into_a_held_part_is_told() -> None:
     """What is held cannot give way, so no stiffer contact keeps the tool out."""
     bar = Cylinder("bar", np.array([0.0, -20.0, 19.2]), np.array([0.0, 50.0, 19.2]), 4.0)
     down = Stage("press", STICKY, gravity=False, fixed=("left",), motions=(ToolMotion("bar", (0.0, 0.0, -1.0)),))
     answer = _solved([bar], down)
-    assert answer.status is Status.STAGNATED
-    assert "'bar' cuts into a part that is held fast, at (0, " in answer.message
+    assert answer.status is Status.BAD_INPUT
+    assert "'bar' would cut into a part that is held fast, at (0, " in answer.message
+    assert not answer.record
 
 
 @pytest.mark.parametrize(

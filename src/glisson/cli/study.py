@@ -33,11 +33,13 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("study", metavar="NAME", choices=tuple(STUDIES), help=listed)
     parser.add_argument("--quick", action="store_true", help="a minute's worth of points, after a set-up that is kept")
     parser.add_argument("--long", action="store_true", help="with the largest meshes (sensitivity)")
-    parser.add_argument("--seed", metavar="N", default="0", help="seed of random numbers, a whole number (default 0)")
+    parser.add_argument(
+        "--seed", metavar="N", help="seed of random numbers, a whole number (lift-robustness, contact; default 0)"
+    )
     parser.add_argument("--out", metavar="DIR", help="folder of the study (default: ./studies/NAME)")
     parser.add_argument("--workers", metavar="N", help="processes on this machine (default: one for each core)")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="compute on the Dask cluster with this scheduler")
-    parser.add_argument("--element", choices=("T4", "T10"), default="T10", help="element of the models (default: T10)")
+    parser.add_argument("--element", choices=("T4", "T10"), help="element of the models (sensitivity; default T10)")
 
 
 def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
@@ -57,7 +59,18 @@ def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
     return Answer(values, "\n".join([conclusion.text, times, f"results   {folder}"]))
 
 
+_OWN_OPTIONS = {
+    "seed": (LiftRobustness.name, ContactStudy.name),
+    "long": (Sensitivity.name,),
+    "element": (Sensitivity.name,),
+}
+"""Options that only some studies have."""
+
+
 def _study(arguments: argparse.Namespace) -> Study:
+    for option, studies in _OWN_OPTIONS.items():
+        if getattr(arguments, option) and arguments.study not in studies:
+            raise BadInput(f"--{option} is for the study {' or '.join(studies)}; {arguments.study} does not have it.")
     seed = _whole_number(arguments.seed, "--seed", 0) or 0
     if arguments.study == LiftRobustness.name:
         return LiftRobustness.of(arguments.quick, seed)
@@ -67,7 +80,7 @@ def _study(arguments: argparse.Namespace) -> Study:
         return Elements.of(arguments.quick)
     if arguments.study == RegionStudy.name:
         return RegionStudy.of(arguments.quick)
-    return Sensitivity.of(arguments.quick, arguments.long, arguments.element)
+    return Sensitivity.of(arguments.quick, arguments.long, arguments.element or "T10")
 
 
 def _executor(arguments: argparse.Namespace) -> Executor:

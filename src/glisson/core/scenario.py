@@ -43,8 +43,8 @@ class LeverDrive:
             raise BadInput(f"Drive lever {self.lever!r} either by angle_deg or by force_n.")
         if self.angle_deg is not None and not -90.0 <= self.angle_deg <= 90.0:
             raise BadInput(f"A lever turns by at most 90°, not {self.angle_deg}°.")
-        if self.force_n is not None and not self.force_n >= 0.0:
-            raise BadInput(f"The lifting force must not be negative ({self.force_n} N).")
+        if self.force_n is not None and not 0.0 <= self.force_n < np.inf:
+            raise BadInput(f"The lifting force must be a number that is not negative, not {self.force_n} N.")
 
 
 @dataclass(frozen=True)
@@ -142,6 +142,15 @@ class Scenario:
         stages = [stage.name for stage in self.stages]
         if len(set(stages)) != len(stages):
             raise BadInput(f"Stages need different names, not {stages}.")
+        for stage in self.stages:
+            for kind, named in (
+                ("drives lever", [drive.lever for drive in stage.drives]),
+                ("moves tool", [motion.tool for motion in stage.motions]),
+                ("moves node set", [move.node_set for move in stage.moves]),
+            ):
+                twice = sorted({name for name in named if named.count(name) > 1})
+                if twice:
+                    raise BadInput(f"Stage {stage.name!r} {kind} {twice[0]!r} twice; give it one goal.")
         levers = {tool.name for tool in self.tools if isinstance(tool, Lever)}
         boards = {tool.name for tool in self.tools if isinstance(tool, Board)}
         for stage in self.stages:
@@ -152,12 +161,9 @@ class Scenario:
                     )
         carried = {tool.name for tool in self.tools if isinstance(tool, Cylinder | MeshTool)}
         for stage in self.stages:
-            moved = [motion.tool for motion in stage.motions]
-            for name in moved:
-                if name not in carried:
-                    raise BadInput(f"Stage {stage.name!r} moves {name!r}, which is no cylinder or mesh tool.")
-            if len(set(moved)) != len(moved):
-                raise BadInput(f"Stage {stage.name!r} moves a tool twice.")
+            for motion in stage.motions:
+                if motion.tool not in carried:
+                    raise BadInput(f"Stage {stage.name!r} moves {motion.tool!r}, which is no cylinder or mesh tool.")
         unknown = set(self.scan_supports) - boards
         if unknown:
             raise BadInput(f"Scan supports {sorted(unknown)} are not boards of the scenario.")

@@ -85,7 +85,8 @@ class Lever:
         if abs(float(self.axis @ self.arm)) > 1e-6:
             raise BadInput("The lever's axis and arm must be perpendicular.")
         sizes = (self.length_mm, self.width_mm, self.thickness_mm)
-        if min(sizes) <= 0.0 or not 0.0 < self.edge_radius_mm <= min(sizes) / 2.0:
+        sound = np.isfinite(sizes).all() and min(sizes) > 0.0
+        if not sound or not 0.0 < self.edge_radius_mm <= min(sizes) / 2.0:
             raise BadInput(
                 f"Lever {self.name!r} needs positive sizes and an edge radius of at most half its "
                 f"smallest one, not {sizes} mm and {self.edge_radius_mm} mm."

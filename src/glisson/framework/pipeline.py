@@ -108,6 +108,8 @@ class Pipeline:
                 technique_class(kind, name)
         case.check_writable()
         with exclusive(case.folder), _disk_errors_as_sentences(case):
+            given = wanted[:-1] if replace else wanted
+            _require_effect(given, case, used)
             shutil.rmtree(case.path(_WORK), ignore_errors=True)  # of a run that was killed
             try:
                 self._mark(case, used)
@@ -143,6 +145,19 @@ class Pipeline:
         text = "These results are out of date; bring them up to date with: glisson run CASE\n" + "\n".join(lines) + "\n"
         if not mark.exists() or mark.read_text(encoding="utf-8") != text:
             mark.write_text(text, encoding="utf-8")
+
+
+def _require_effect(stages: Sequence[Stage], case: Case, settings: Settings) -> None:
+    """Refuse new settings of a stage whose outputs a person gave, which would stay as they are."""
+    before = case.settings()
+    for stage in stages:
+        if stage.settings(settings) != stage.settings(before):
+            state = stage_state(stage, case, settings)
+            if state.state is State.GIVEN:
+                raise BadInput(
+                    f"Other settings of the stage {stage.name} have no effect, because {state.reason}; edit that, or "
+                    "remove it to have it made anew."
+                )
 
 
 def _current(

@@ -28,6 +28,7 @@ _FLOW_STEPS = 40
 _EASY = 12  # iterations of a step of the flow after which the drag fades faster
 _THICKEST = 1e3  # of the first drag
 _FIRMER = 2.0
+_BEARS_MN = 1.0  # a tool that presses less only grazes the organ
 _ROUGH_TOLERANCE = 1e-2  # while the points that cohere are sought
 
 
@@ -120,12 +121,6 @@ class LoadPath:
         for _ in range(_STIFFENINGS):
             if not penetrated:
                 break
-            where = self._held_inside(penetrated[0])
-            if where is not None:
-                reason = (
-                    f"{penetrated[0].tool.name!r} cuts into a part that is held fast, at ({where}) mm; move it away"
-                )
-                return replace(end, status=Status.STAGNATED, reason=reason)
             for contact in penetrated:
                 contact.cushion = contact.cushion.stiffened(_FIRMER)
             end = self.load_step(body.loading)
@@ -251,15 +246,6 @@ class LoadPath:
         hard = [contact for contact in self.body.contacts if not contact.tool.yields]
         return [c for c in hard if float(c.gaps(points).min()) <= margin * c.cushion.range_mm]
 
-    def _held_inside(self, contact: ToolContact) -> str | None:
-        """Where a tool is deepest in the organ, if that is a part that can't give way."""
-        body = self.body
-        points = body.surface.positions(self.positions)
-        deepest = int(contact.gaps(points).argmin())
-        if not body.fixed[body.surface.nodes[deepest]].all():
-            return None
-        return ", ".join(f"{x:.0f}" for x in points[deepest])
-
     def accept(self, reach: float, end: NewtonEnd) -> None:
         """Go on from an equilibrium, at a share of the way; friction remembers it."""
         body = self.body
@@ -268,7 +254,8 @@ class LoadPath:
         self._note(reach, end)
         self.steps.append((reach, end.positions))
         for contact, touch in zip(body.contacts, body.touches(end.positions, update_friction=False), strict=True):
-            name, touching = contact.tool.name, bool(len(touch.points))
+            name = contact.tool.name
+            touching = float(touch.pressures @ body.surface.areas[touch.points]) > _BEARS_MN
             if contact.tool.moves and name in self.history.touched and not touching:
                 self.history.touched.discard(name)
                 at = degrees(contact.angle) if isinstance(contact.tool, LeverTool) else None

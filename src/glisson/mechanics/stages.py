@@ -18,6 +18,7 @@ from glisson.mechanics.body import Body, LoadState, ToolState
 from glisson.mechanics.carried_tool import CarriedTool
 from glisson.mechanics.contact_report import report_contacts
 from glisson.mechanics.force_drive import lift_by_force
+from glisson.mechanics.held_in_the_way import held_in_the_way
 from glisson.mechanics.lever_tool import LeverTool
 from glisson.mechanics.load_path import History, LoadPath
 from glisson.mechanics.loads import fixed_unknowns, gravity_forces
@@ -80,7 +81,7 @@ class StageRunner:
             rod = rods[0] if rods else None
             results.append(StageResult(stage.name, positions - self._model.mesh.nodes, end.status, contacts, rod))
             if end.status is not Status.CONVERGED:
-                return self._deformation(results, end.status, _sentence(stage, end))
+                return self._deformation(results, end.status, self._sentence(stage, end))
         missed = self._never_touched()
         if missed is not None:
             return self._deformation(results, Status.BAD_INPUT, missed)
@@ -92,6 +93,9 @@ class StageRunner:
         if self._number == 0:
             body.law = stage.contact
         for goal in self._goals(stage):
+            blocked = held_in_the_way(body, self._path.positions, goal)
+            if blocked is not None:
+                return NewtonEnd(self._path.positions, Status.BAD_INPUT, 0, float("nan"), blocked)
             end = self._carrier.carry(self._path, goal)
             if end.status is not Status.CONVERGED:
                 return end
@@ -122,13 +126,17 @@ class StageRunner:
         yield LoadState(ToolState(tuple(angles), stage.contact), external, carried, stage.gas_pressure_kpa)
 
     def _never_touched(self) -> str | None:
-        """A sentence about a driven lever that missed the organ in every load step."""
-        driven = {drive.lever for stage in self._scenario.stages for drive in stage.drives}
+        """A sentence about a moved tool that missed the organ in every load step."""
+        stages = self._scenario.stages
+        levers = {drive.lever for stage in stages for drive in stage.drives}
+        driven = levers | {motion.tool for stage in stages for motion in stage.motions}
         history = self._path.history
         lost = {event.tool for event in history.events}
         for name in sorted(driven - history.touched - lost):
             contact = self._body.contacts[self._body.contact_number(name)]
             gap = float(contact.gaps(self._body.surface.positions(self._path.positions)).min())
+            if name not in levers:
+                return f"Tool {name!r} never touched the organ: it ends {gap:.1f} mm away; move it further."
             return (
                 f"Lever {name!r} never touched the organ: at {degrees(contact.angle):.0f}° it still is {gap:.1f} mm "
                 "away; move its hinge, lengthen it or turn it further."
@@ -142,14 +150,13 @@ class StageRunner:
         words = special or (f"{name}: lever at {', '.join(levers)}" if levers else name)
         self._progress(None if reach is None else (self._number + reach) / len(stages), words)
 
+    def _sentence(self, stage: Stage, end: NewtonEnd) -> str:
+        reason = end.reason or end.status.sentence.rstrip(".").lower()
+        # What could not even be begun has no residual; and where it is small, it is not what is wrong.
+        left = f" (relative residual {end.residual:.1e})" if end.residual > self._path.newton.settings.tolerance else ""
+        return f"Stage {stage.name!r} did not reach equilibrium{left}: {reason}."
+
     def _deformation(self, stages: list[StageResult], status: Status, message: str) -> Deformation:
         history = self._path.history
         steps, events, error = tuple(history.record), tuple(history.events), self._carrier.estimated_error
         return Deformation(self._model.mesh, tuple(stages), status, message, steps, events, error)
-
-
-def _sentence(stage: Stage, end: NewtonEnd) -> str:
-    reason = end.reason or end.status.sentence.rstrip(".").lower()
-    # A load step that could not even be begun has no residual.
-    left = f" (relative residual {end.residual:.1e})" if np.isfinite(end.residual) else ""
-    return f"Stage {stage.name!r} did not reach equilibrium{left}: {reason}."

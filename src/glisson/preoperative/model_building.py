@@ -116,6 +116,7 @@ def build_model(
     _require_volume(mesh, volume_ml)
     progress(0.8, "regions and structures")
     regions, names = element_regions(mesh, tumours)
+    _require_regions(settings, {*names.values(), *(() if tumours is None else tumours.names.values())})
     mesh = TetMesh(mesh.nodes, mesh.tetrahedra, regions)
     model = Model(
         mesh=mesh,
@@ -132,6 +133,12 @@ def build_model(
     counts = {name: int((regions == number).sum()) for number, name in names.items()}
     report = MeshReport(mesh_quality(mesh), volume_ml, mesh.volume_mm3 * 1e-3 / volume_ml - 1.0, counts, tuple(notes))
     return model, report
+
+
+def _require_regions(settings: ModelSettings, known: set[str]) -> None:
+    unknown = sorted(set(settings.materials) - known - {ORGAN, TUMOURS})
+    if unknown:
+        raise BadInput(f"There is no region {unknown[0]!r} to be of a material; there are {sorted(known)}.")
 
 
 def _require_volume(mesh: TetMesh, mask_ml: float) -> None:

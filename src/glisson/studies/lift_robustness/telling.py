@@ -15,6 +15,7 @@ def as_lines(values: Mapping[str, Any]) -> list[str]:
             f"converged {converged} ({100.0 * values['converged']:.1f} %), {values['slipped_off']} of them slipped "
             f"off the lever; {values['inverted']} with inverted elements, {values['penetrated']} with penetration"
         )
+    lines += [f"impossible {_words(row)}: {row['message']}" for row in values["impossible"]]
     lines += [f"failed    {_words(row)}: {row['message']}" for row in values["failed"]]
     if values["unfinished"]:
         lines.append(f"note      {values['unfinished']} points are not done yet; run again to go on")
