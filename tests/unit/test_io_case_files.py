@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from blocks import block
 
+from conftest import ROOT
 from glisson.core import (
     BadInput,
     Board,
@@ -164,6 +165,31 @@ def test_the_keys_of_a_scenario_are_the_agreed_ones(tmp_path):
     expected = {"name", "friction", "cohesion_kpa", "gravity", "fixed", "drives", "moves", "gas_pressure_kpa"}
     assert set(table["stages"][0]) == expected | {"motions"}
     assert table["stages"][1]["drives"] == [{"lever": "lever", "force_n": 2.5}]
+
+
+def test_the_scenario_of_the_docs_is_one(tmp_path):
+    text = (ROOT / "docs" / "scenario.md").read_text().split("```toml\n")[1].split("```")[0]
+    (tmp_path / "scenario.toml").write_text(text)
+    scenario = read_scenario(tmp_path / "scenario.toml")
+    board, lever, jaw, wedge = scenario.tools
+    assert [tool.name for tool in scenario.tools] == ["board", "lever", "jaw", "wedge"]
+    np.testing.assert_allclose(lever.up, [0.0, -1.0, 0.0])  # the tip goes to the front, away from the board
+    assert wedge.surface.volume_mm3 == pytest.approx(20.0**3 / 6.0)
+    assert scenario.stages[1].motions[0].tool == jaw.name
+    assert board.slot.width_mm == 30.0
+
+
+@pytest.mark.parametrize(
+    ("stage", "complaint"),
+    [
+        (Stage("s", ContactLaw(), (LeverDrive("l", 5.0), LeverDrive("l", 9.0))), "drives lever 'l' twice"),
+        (Stage("s", ContactLaw(), moves=(Move("a", (1, 0, 0)), Move("a", (2, 0, 0)))), "moves node set 'a' twice"),
+    ],
+)
+def test_two_goals_for_one_thing_are_refused(stage, complaint):
+    lever = Lever.lifting("l", np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0]))
+    with pytest.raises(BadInput, match=complaint):
+        Scenario((lever,), (stage,))
 
 
 def test_a_scenario_by_hand_takes_the_defaults(tmp_path):
