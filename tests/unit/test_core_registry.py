@@ -26,6 +26,14 @@ class Good:
     def missing_dependencies(cls) -> tuple[str, ...]:
         return cls.missing
 
+    def mesh(self, surface: Any, progress: Any = None) -> None:
+        """Nothing."""
+
+
+class NoMesher(Good):
+    name: ClassVar[str] = "idle"
+    mesh = None
+
 
 class Lacking(Good):
     name: ClassVar[str] = "lacking"
@@ -44,6 +52,7 @@ def offered(monkeypatch: pytest.MonkeyPatch) -> None:
     points = [
         EntryPoint("good", f"{HERE}:Good", "glisson.meshers"),
         EntryPoint("lacking", f"{HERE}:Lacking", "glisson.meshers"),
+        EntryPoint("idle", f"{HERE}:NoMesher", "glisson.meshers"),
         EntryPoint("odd", f"{HERE}:NotATechnique", "glisson.meshers"),
         EntryPoint("renamed", f"{HERE}:Good", "glisson.meshers"),
         EntryPoint("gone", "a_package_that_is_not_there:X", "glisson.meshers"),
@@ -65,6 +74,7 @@ def test_a_technique_is_made_with_checked_parameters() -> None:
     [
         ("absent", ["no mesher technique 'absent'", "good"]),
         ("lacking", ["needs torch>=2", "install"]),
+        ("idle", ["does not load", "it lacks mesh, see glisson.core.protocols.Mesher"]),
         ("odd", ["does not load", "Parameters"]),
         ("renamed", ["does not load", "'renamed'"]),
         ("gone", ["does not load", "a_package_that_is_not_there"]),

@@ -16,7 +16,7 @@ from glisson.core.arrays import FloatArray
 from glisson.core.deformation import Deformation
 from glisson.core.image import LabelMap, Volume
 from glisson.core.mesh import TetMesh, TriangleSurface
-from glisson.core.model import Model
+from glisson.core.model import Material, Model
 from glisson.core.observations import Observations
 from glisson.core.scenario import Scenario
 from glisson.core.transform import RigidTransform
@@ -96,7 +96,27 @@ class Mesher(Technique, Protocol):
 
 
 class MaterialLaw(Technique, Protocol):
-    """A hyperelastic law (entry-point group `glisson.materials`); see `glisson.mechanics.materials`."""
+    """A hyperelastic law (entry-point group `glisson.materials`), of many deformation gradients F (n, 3, 3) at once.
+
+    It vanishes at F = 1, is frame-indifferent (the small-strain one excepted) and reduces to linear elasticity
+    with the material's Young's modulus and Poisson's ratio for small strain. Everything is in kPa.
+    """
+
+    def check(self, material: Material) -> None:
+        """Whether the material has the constants that the law needs.
+
+        Raises:
+            BadInput: it has not.
+        """
+
+    def energy(self, gradients: FloatArray, material: Material) -> FloatArray:
+        """Strain energy density W (n,); infinite where the law has no meaning (J ≤ 0)."""
+
+    def stress(self, gradients: FloatArray, material: Material) -> FloatArray:
+        """First Piola–Kirchhoff stress P = ∂W/∂F, (n, 3, 3)."""
+
+    def tangent(self, gradients: FloatArray, material: Material) -> FloatArray:
+        """∂P/∂F as (n, 9, 9), rows and columns being the row-major entries of P and F."""
 
 
 class Solver(Technique, Protocol):

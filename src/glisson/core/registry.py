@@ -10,6 +10,16 @@ from typing import Any
 
 from glisson.core.errors import BadInput
 from glisson.core.parameters import build_parameters
+from glisson.core.protocols import (
+    Localiser,
+    MaterialLaw,
+    Mesher,
+    Registration,
+    Segmenter,
+    Solver,
+    SurfaceExtractor,
+    SurfaceReconstructor,
+)
 
 KINDS = {
     "segmenter": "glisson.segmenters",
@@ -22,6 +32,17 @@ KINDS = {
     "localiser": "glisson.localisers",
 }
 """Kind of technique → entry-point group."""
+
+_PROTOCOLS: dict[str, type[Any]] = {
+    "segmenter": Segmenter,
+    "surface-extractor": SurfaceExtractor,
+    "mesher": Mesher,
+    "material": MaterialLaw,
+    "solver": Solver,
+    "registration": Registration,
+    "surface-reconstructor": SurfaceReconstructor,
+    "localiser": Localiser,
+}
 
 
 @dataclass(frozen=True)
@@ -50,7 +71,7 @@ def technique_class(kind: str, name: str) -> Any:
     """
     point = _point(kind, name)
     try:
-        loaded, missing = _loaded(point)
+        loaded, missing = _loaded(kind, point)
     except Exception as error:  # a plug-in may fail in any way while it is imported
         raise BadInput(f"The {kind} technique {name!r} of {_package(point)} does not load: {error}.") from error
     if missing:
@@ -84,19 +105,24 @@ def list_techniques(kinds: Iterable[str] = KINDS) -> tuple[Listing, ...]:
 
 def _listing(kind: str, point: EntryPoint) -> Listing:
     try:
-        loaded, missing = _loaded(point)
+        loaded, missing = _loaded(kind, point)
         return Listing(kind, point.name, _package(point), loaded.summary, missing)
     except Exception as error:  # a plug-in may fail in any way while it is imported
         return Listing(kind, point.name, _package(point), "", (), f"{type(error).__name__}: {error}")
 
 
-def _loaded(point: EntryPoint) -> tuple[Any, tuple[str, ...]]:
+def _loaded(kind: str, point: EntryPoint) -> tuple[Any, tuple[str, ...]]:
     """The class behind an entry point, checked to be a technique, and what it misses."""
     loaded = point.load()
     if not is_dataclass(getattr(loaded, "Parameters", None)):
         raise TypeError("it has no dataclass Parameters, see glisson.core.protocols.Technique")
     if not isinstance(getattr(loaded, "summary", None), str) or getattr(loaded, "name", None) != point.name:
         raise TypeError(f"it needs a summary and the name {point.name!r} under which it is registered")
+    protocol = _PROTOCOLS[kind]
+    methods = [name for name, value in vars(protocol).items() if callable(value) and not name.startswith("_")]
+    lacking = [name for name in methods if not callable(getattr(loaded, name, None))]
+    if lacking:
+        raise TypeError(f"it lacks {', '.join(lacking)}, see glisson.core.protocols.{protocol.__name__}")
     return loaded, tuple(loaded.missing_dependencies())
 
 

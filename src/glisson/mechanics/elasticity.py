@@ -13,8 +13,9 @@ from numba import njit
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.mesh import TetMesh
 from glisson.core.model import Material
+from glisson.core.protocols import MaterialLaw
 from glisson.mechanics.elements import ElementQuadrature, quadrature
-from glisson.mechanics.materials.law import Law, find_law
+from glisson.mechanics.materials.law import law_of
 from glisson.mechanics.pattern import BlockPattern, Index
 
 _CHUNK = 2048  # quadrature points whose tangents are held at once, small enough for a core's cache
@@ -32,7 +33,7 @@ class _Chunk:
     """Elements of one region that are worked on together."""
 
     elements: IntArray
-    law: Law
+    law: MaterialLaw
     material: Material
 
 
@@ -72,8 +73,7 @@ class Elasticity:
         """The elements of one region among those of the numbers `part`."""
         elements = part[self.mesh.region_numbers[part] == region]
         material = materials[int(region)]
-        law = find_law(material.law)
-        law.check(material)
+        law = law_of(material)
         count = -(-len(elements) * self._quadrature.weights.shape[1] // _CHUNK)
         return [_Chunk(piece, law, material) for piece in np.array_split(elements, count)]
 

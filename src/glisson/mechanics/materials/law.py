@@ -1,41 +1,29 @@
-"""What a material law computes, and how the law of a region is found."""
+"""What material laws share, and how the law of a region is found."""
 
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from functools import lru_cache
+from typing import ClassVar
 
-from glisson.core.arrays import FloatArray
+import numpy as np
+
 from glisson.core.errors import BadInput
 from glisson.core.model import Material
+from glisson.core.protocols import MaterialLaw
 from glisson.core.registry import make_technique
+
+_TRIALS = np.eye(3) + np.array(
+    [
+        [[0.02, 0.01, 0.0], [-0.01, -0.01, 0.03], [0.0, 0.02, 0.01]],
+        [[0.10, 0.05, -0.04], [0.02, -0.08, 0.06], [0.03, -0.05, 0.04]],
+        [[-0.12, 0.20, 0.00], [0.05, 0.15, -0.10], [0.08, 0.02, 0.05]],
+    ]
+)
+_STEP, _APART = 1e-5, 1e-4
 
 
 @dataclass(frozen=True)
 class NoParameters:
     """A law has no parameters of its own: its constants belong to the region's `Material`."""
-
-
-class Law(Protocol):
-    """Energy, stress and tangent of many deformation gradients F (n, 3, 3) at once, in kPa.
-
-    A law vanishes at F = 1, is frame-indifferent (the small-strain one excepted) and reduces to linear
-    elasticity with the material's Young's modulus and Poisson's ratio for small strain.
-    """
-
-    def check(self, material: Material) -> None:
-        """Whether the material has the constants that the law needs.
-
-        Raises:
-            BadInput: it has not.
-        """
-
-    def energy(self, gradients: FloatArray, material: Material) -> FloatArray:
-        """Strain energy density W (n,); infinite where the law has no meaning (J ≤ 0)."""
-
-    def stress(self, gradients: FloatArray, material: Material) -> FloatArray:
-        """First Piola–Kirchhoff stress P = ∂W/∂F, (n, 3, 3)."""
-
-    def tangent(self, gradients: FloatArray, material: Material) -> FloatArray:
-        """∂P/∂F as (n, 9, 9), rows and columns being the row-major entries of P and F."""
 
 
 class PlainLaw:
@@ -61,11 +49,37 @@ class PlainLaw:
             raise BadInput(f"Material law {material.law} takes no constants, but there are {list(material.constants)}.")
 
 
-def find_law(name: str) -> Law:
+def find_law(name: str) -> MaterialLaw:
     """The law registered under `name` in the entry-point group `glisson.materials`.
 
     Raises:
         BadInput: there is no such law.
     """
-    law: Law = make_technique("material", name, {}, f"material law {name}")
+    law: MaterialLaw = make_technique("material", name, {}, f"material law {name}")
+    return law
+
+
+@lru_cache(maxsize=64)
+def law_of(material: Material) -> MaterialLaw:
+    """The law of a material, tried on a few deformations: whoever writes one may slip.
+
+    Raises:
+        BadInput: there is no such law, the material lacks its constants, or its stress or tangent is not the
+            derivative that it has to be.
+    """
+    law = find_law(material.law)
+    law.check(material)
+    scale = material.young_modulus_kpa
+    across = np.random.default_rng(0).normal(size=_TRIALS.shape)
+    ahead, behind = _TRIALS + _STEP * across, _TRIALS - _STEP * across
+    with np.errstate(all="ignore"):
+        slope = (law.energy(ahead, material) - law.energy(behind, material)) / (2.0 * _STEP)
+        power = np.einsum("nij,nij->n", law.stress(_TRIALS, material), across)
+        change = (law.stress(ahead, material) - law.stress(behind, material)) / (2.0 * _STEP)
+        rate = np.einsum("nab,nb->na", law.tangent(_TRIALS, material), across.reshape(-1, 9)).reshape(-1, 3, 3)
+    for what, found, expected in (("stress", power, slope), ("tangent", rate, change)):
+        apart = float(np.abs(found - expected).max())
+        if not apart <= _APART * max(scale, float(np.abs(expected).max())):
+            of = "energy" if what == "stress" else "stress"
+            raise BadInput(f"Material law {material.law!r} is wrong: its {what} is not the derivative of its {of}.")
     return law
