@@ -11,11 +11,15 @@ from typing import Any, TextIO
 
 @dataclass(frozen=True)
 class Answer:
-    """What a command has to say: `values` for machines, `text` for people, and the exit code."""
+    """What a command has to say: `values` for machines, `text` for people, and the exit code.
+
+    `is_error`: the text is no result but says why there is none.
+    """
 
     values: Mapping[str, Any]
     text: str = ""
     exit_code: int = 0
+    is_error: bool = False
 
     def line(self) -> str:
         """The values as one line of JSON.
@@ -64,8 +68,8 @@ def _whether_read_or_not(stream: TextIO) -> Iterator[None]:
 
 
 def tell(answer: Answer, as_json: bool, stdout: TextIO) -> None:
-    """Print an answer: with `as_json` one object on `stdout` and the text on stderr, else the text on `stdout`."""
+    """Print an answer: with `as_json` one object on `stdout` and the text on stderr, else a result on `stdout`."""
     if as_json:
         stdout.write(answer.line())
     if answer.text:
-        (sys.stderr if as_json else stdout).write(answer.text.rstrip("\n") + "\n")
+        (sys.stderr if as_json or answer.is_error else stdout).write(answer.text.rstrip("\n") + "\n")

@@ -89,7 +89,7 @@ def _failure(error: BaseException, stage: str | None, command: Command | None) -
     exit_code = 1
     message = str(error)
     if isinstance(error, KeyboardInterrupt):
-        where = "" if stage is None else f" in the stage {stage}; the case is as it was before that stage"
+        where = "" if stage is None else f" in the stage {stage}; what was done before it is kept"
         message, exit_code = message or f"Interrupted{where}.", _INTERRUPTED
     elif isinstance(error, StageFailed):
         status = error.status
@@ -108,7 +108,7 @@ def _failure(error: BaseException, stage: str | None, command: Command | None) -
     else:
         raise error
     values = dict.fromkeys(command.keys if command else ()) | {"status": status, "message": message, "stage": stage}
-    return Answer(values, f"glisson: {message}", exit_code)
+    return Answer(values, f"glisson: {message}", exit_code, is_error=True)
 
 
 def _command(name: str) -> Command | None:

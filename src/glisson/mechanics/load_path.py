@@ -34,18 +34,23 @@ _ROUGH_TOLERANCE = 1e-2  # while the points that cohere are sought
 
 @dataclass(eq=False)
 class History:
-    """What happened in the load steps so far, in the stage of name `stage`; `touched` are tools that bear now."""
+    """What happened in the load steps so far, in the stage of name `stage`.
+
+    `met` are tools that have come near enough to touch at some time, `bearing` moving ones that bear the organ now.
+    """
 
     stage: str = ""
     record: list[LoadStep] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
-    touched: set[str] = field(default_factory=set)
+    met: set[str] = field(default_factory=set)
+    bearing: set[str] = field(default_factory=set)
 
     def extend(self, other: "History") -> None:
         """Go on with what happened to a part of the body meanwhile."""
         self.record += other.record
         self.events += other.events
-        self.touched = other.touched
+        self.met |= other.met
+        self.bearing = other.bearing
 
 
 class LoadPath:
@@ -105,7 +110,7 @@ class LoadPath:
                 self.accept(done, end)
                 share = min(share * GROWTH, 1.0 / steps)
             elif end.status is Status.SINGULAR or share / 2.0 < _SMALLEST_SHARE / steps:
-                self._note(reach, end)
+                self.note(reach, end)
                 return end
             else:
                 share /= 2.0
@@ -251,19 +256,22 @@ class LoadPath:
         body = self.body
         self.positions = end.positions
         body.accept(end.positions)
-        self._note(reach, end)
+        self.note(reach, end)
         self.steps.append((reach, end.positions))
         for contact, touch in zip(body.contacts, body.touches(end.positions, update_friction=False), strict=True):
             name = contact.tool.name
-            touching = float(touch.pressures @ body.surface.areas[touch.points]) > _BEARS_MN
-            if contact.tool.moves and name in self.history.touched and not touching:
-                self.history.touched.discard(name)
+            bears = float(touch.pressures @ body.surface.areas[touch.points]) > _BEARS_MN
+            if len(touch.points):
+                self.history.met.add(name)
+            if contact.tool.moves and name in self.history.bearing and not bears:
+                self.history.bearing.discard(name)
                 at = degrees(contact.angle) if isinstance(contact.tool, LeverTool) else None
                 self.history.events.append(Event("lost_contact", name, at))
-            if touching:
-                self.history.touched.add(name)
+            if bears:
+                self.history.bearing.add(name)
 
-    def _note(self, reach: float, end: NewtonEnd) -> None:
+    def note(self, reach: float, end: NewtonEnd) -> None:
+        """Let the record tell of a load step."""
         energy = self.body.energy(end.positions)
         self.history.record.append(
             LoadStep(self.history.stage, reach, end.iterations, end.residual, energy, end.status)

@@ -98,6 +98,7 @@ class RegionFirst:
             correction = np.linalg.norm(path.positions - composite, axis=1)
             self.estimated_error = self.estimated_error + _ERROR_SHARE * correction
             path.history.extend(inner.history)
+            path.note(1.0, end)
         return end
 
 
@@ -108,7 +109,7 @@ def _stations(way: Way) -> Way:
 
 def _path_within(path: LoadPath, region: CutRegion, newton: Newton) -> LoadPath:
     """A path for the region from where the whole organ is."""
-    history = History(path.history.stage, touched=set(path.history.touched))
+    history = History(path.history.stage, bearing=set(path.history.bearing))
     return LoadPath(region.body, newton, path.positions[region.nodes], degrees(path.step_rad), history, path.progress)
 
 

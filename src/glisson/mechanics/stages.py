@@ -130,9 +130,7 @@ class StageRunner:
         stages = self._scenario.stages
         levers = {drive.lever for stage in stages for drive in stage.drives}
         driven = levers | {motion.tool for stage in stages for motion in stage.motions}
-        history = self._path.history
-        lost = {event.tool for event in history.events}
-        for name in sorted(driven - history.touched - lost):
+        for name in sorted(driven - self._path.history.met):
             contact = self._body.contacts[self._body.contact_number(name)]
             gap = float(contact.gaps(self._body.surface.positions(self._path.positions)).min())
             if name not in levers:
