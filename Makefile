@@ -9,7 +9,7 @@ DEMO_OUT ?= demo
 help:
 	@echo "make demo    run the whole way on the embedded phantom; writes $(DEMO_OUT)/results/report.html"
 	@echo "make test    run the tests"
-	@echo "make bench   measure the solver and a lift beside other engines; makes their environments first (about 2.5 GB, once)"
+	@echo "make bench   measure solver and lift beside other engines; makes their environments first (2.5 GB, once)"
 	@echo "make verify  compare the tissue mechanics with closed forms and other engines; writes studies/verify"
 	@echo "make check   ruff, mypy --strict, import contracts"
 	@echo "make lock    renew requirements.lock from pyproject.toml"

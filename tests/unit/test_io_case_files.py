@@ -179,6 +179,13 @@ def test_the_scenario_of_the_docs_is_one(tmp_path):
     assert board.slot.width_mm == 30.0
 
 
+def test_sizes_and_forces_that_are_no_numbers_are_refused():
+    with pytest.raises(BadInput, match="needs positive sizes"):
+        Lever("l", np.zeros(3), np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]), width_mm=math.nan)
+    with pytest.raises(BadInput, match="not inf N"):
+        LeverDrive("l", force_n=math.inf)
+
+
 @pytest.mark.parametrize(
     ("stage", "complaint"),
     [

@@ -70,6 +70,9 @@ def test_a_lift_ends_where_the_whole_organ_does(still_mm: float) -> None:
         for contact, beside in zip(stage.contacts, other.contacts, strict=True):
             np.testing.assert_allclose(beside.force_n, contact.force_n, atol=0.05)
             assert beside.least_gap_mm > 0.0
+    # The last of the record is the whole organ with the region in exact equilibrium.
+    assert found.record[-1].residual <= QuasiStaticParameters().tolerance
+    assert found.record[-1].energy_uj == pytest.approx(whole.record[-1].energy_uj, rel=0.01)
     true = np.linalg.norm(whole.displacement - found.displacement, axis=1)
     moved = np.linalg.norm(whole.displacement, axis=1) > still_mm
     assert 0.1 < found.estimated_error[moved].mean() / true[moved].mean() < 10.0

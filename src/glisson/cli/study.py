@@ -28,6 +28,14 @@ STUDIES = {
 }
 
 
+_OWN_OPTIONS = {
+    "seed": (LiftRobustness.name, ContactStudy.name),
+    "long": (Sensitivity.name,),
+    "element": (Sensitivity.name,),
+}
+"""Options that only some studies have."""
+
+
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
     listed = "; ".join(f"{name}: {what}" for name, what in STUDIES.items())
     parser.add_argument("study", metavar="NAME", choices=tuple(STUDIES), help=listed)
@@ -57,14 +65,6 @@ def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
         temporary.write_text(json.dumps(values, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     times = f"seconds   set-up {seconds['set-up']:.1f} (kept), points {seconds['points']:.1f}"
     return Answer(values, "\n".join([conclusion.text, times, f"results   {folder}"]))
-
-
-_OWN_OPTIONS = {
-    "seed": (LiftRobustness.name, ContactStudy.name),
-    "long": (Sensitivity.name,),
-    "element": (Sensitivity.name,),
-}
-"""Options that only some studies have."""
 
 
 def _study(arguments: argparse.Namespace) -> Study:

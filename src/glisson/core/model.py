@@ -26,6 +26,7 @@ class Material:
     constants: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "constants", tuple(self.constants))
         if not np.isfinite(self.constants).all():
             raise BadInput(f"Constants of a material law must be finite numbers, not {list(self.constants)}.")
         if not self.young_modulus_kpa > 0.0 or not np.isfinite(self.young_modulus_kpa):

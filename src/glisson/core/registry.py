@@ -21,28 +21,17 @@ from glisson.core.protocols import (
     SurfaceReconstructor,
 )
 
-KINDS = {
-    "segmenter": "glisson.segmenters",
-    "surface-extractor": "glisson.surface_extractors",
-    "mesher": "glisson.meshers",
-    "material": "glisson.materials",
-    "solver": "glisson.solvers",
-    "registration": "glisson.registrations",
-    "surface-reconstructor": "glisson.surface_reconstructors",
-    "localiser": "glisson.localisers",
+KINDS: dict[str, tuple[str, type[Any]]] = {
+    "segmenter": ("glisson.segmenters", Segmenter),
+    "surface-extractor": ("glisson.surface_extractors", SurfaceExtractor),
+    "mesher": ("glisson.meshers", Mesher),
+    "material": ("glisson.materials", MaterialLaw),
+    "solver": ("glisson.solvers", Solver),
+    "registration": ("glisson.registrations", Registration),
+    "surface-reconstructor": ("glisson.surface_reconstructors", SurfaceReconstructor),
+    "localiser": ("glisson.localisers", Localiser),
 }
-"""Kind of technique → entry-point group."""
-
-_PROTOCOLS: dict[str, type[Any]] = {
-    "segmenter": Segmenter,
-    "surface-extractor": SurfaceExtractor,
-    "mesher": Mesher,
-    "material": MaterialLaw,
-    "solver": Solver,
-    "registration": Registration,
-    "surface-reconstructor": SurfaceReconstructor,
-    "localiser": Localiser,
-}
+"""Kind of technique → entry-point group and protocol."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +107,7 @@ def _loaded(kind: str, point: EntryPoint) -> tuple[Any, tuple[str, ...]]:
         raise TypeError("it has no dataclass Parameters, see glisson.core.protocols.Technique")
     if not isinstance(getattr(loaded, "summary", None), str) or getattr(loaded, "name", None) != point.name:
         raise TypeError(f"it needs a summary and the name {point.name!r} under which it is registered")
-    protocol = _PROTOCOLS[kind]
+    _, protocol = KINDS[kind]
     methods = [name for name, value in vars(protocol).items() if callable(value) and not name.startswith("_")]
     lacking = [name for name in methods if not callable(getattr(loaded, name, None))]
     if lacking:
@@ -140,7 +129,8 @@ def _point(kind: str, name: str) -> EntryPoint:
 def _points(kind: str) -> tuple[EntryPoint, ...]:
     if kind not in KINDS:
         raise BadInput(f"There is no kind of technique {kind!r}; known are {sorted(KINDS)}.")
-    return tuple(entry_points(group=KINDS[kind]))
+    group, _ = KINDS[kind]
+    return tuple(entry_points(group=group))
 
 
 def _package(point: EntryPoint) -> str:

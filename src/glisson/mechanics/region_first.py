@@ -114,7 +114,7 @@ def _path_within(path: LoadPath, region: CutRegion, newton: Newton) -> LoadPath:
 
 
 def _settled_within(region: CutRegion, path: LoadPath) -> NewtonEnd:
-    """Exact equilibrium of the region, the others' nodes staying where they are."""
+    """Exact equilibrium of the region, the others' nodes staying where they are; with positions of all."""
     region.follow(path.body, path.positions)
     newton = Newton(region.body, make_iterative_solver(), path.newton.settings)
     inner = _path_within(path, region, newton)
@@ -127,4 +127,4 @@ def _settled_within(region: CutRegion, path: LoadPath) -> NewtonEnd:
         region.lead(path.body)
         path.positions = path.positions.copy()
         path.positions[region.nodes] = end.positions
-    return end
+    return replace(end, positions=path.positions)

@@ -10,6 +10,7 @@ from itertools import combinations
 
 import numpy as np
 
+from glisson.core.arrays import IntArray
 from glisson.core.errors import BadInput
 from glisson.core.image import LabelMap
 
@@ -25,7 +26,7 @@ class ResectionType:
     removed: tuple[int, ...]
     extendable: tuple[int, ...] = ()
 
-    def variants(self) -> "Iterator[Resection]":
+    def variants(self) -> Iterator["Resection"]:
         """The resection alone, then with every choice of its extensions, the smaller ones first."""
         for count in range(len(self.extendable) + 1):
             for more in combinations(self.extendable, count):
@@ -77,9 +78,7 @@ def resections(segments: LabelMap) -> tuple[Resection, ...]:
     table = [variant for kind in TABLE_1 for variant in kind.variants()]
     single = [Resection(f"segment {number}", (number,)) for number in SEGMENTS]
     named = {resection.removed for resection in table}
-    pairs = [
-        Resection(f"segments {_listed(pair)}", pair) for pair in adjoining_pairs(segments) if pair not in named
-    ]  # fmt: skip
+    pairs = [Resection(f"segments {_listed(pair)}", pair) for pair in adjoining_pairs(segments) if pair not in named]
     return (*table, *single, *pairs)
 
 
@@ -111,7 +110,7 @@ def adjoining_pairs(segments: LabelMap) -> tuple[tuple[int, int], ...]:
     return tuple(sorted(found))
 
 
-def _counts(segments: LabelMap) -> "np.ndarray[tuple[int], np.dtype[np.int64]]":
+def _counts(segments: LabelMap) -> IntArray:
     """Voxels of each label from 0 to 8, those of 0 being none."""
     voxels = segments.voxels
     if voxels.min() < 0 or voxels.max() > SEGMENTS[-1]:

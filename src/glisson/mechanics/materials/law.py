@@ -18,7 +18,10 @@ _TRIALS = np.eye(3) + np.array(
         [[-0.12, 0.20, 0.00], [0.05, 0.15, -0.10], [0.08, 0.02, 0.05]],
     ]
 )
-_STEP, _APART = 1e-5, 1e-4
+"""Deformation gradients (n, 3, 3), from small strain to some 20 %."""
+
+_STEP = 1e-5  # of the differences
+_APART = 1e-4  # share of the modulus, or of what is larger, that rounding may leave
 
 
 @dataclass(frozen=True)
@@ -69,7 +72,6 @@ def law_of(material: Material) -> MaterialLaw:
     """
     law = find_law(material.law)
     law.check(material)
-    scale = material.young_modulus_kpa
     across = np.random.default_rng(0).normal(size=_TRIALS.shape)
     ahead, behind = _TRIALS + _STEP * across, _TRIALS - _STEP * across
     with np.errstate(all="ignore"):
@@ -79,7 +81,7 @@ def law_of(material: Material) -> MaterialLaw:
         rate = np.einsum("nab,nb->na", law.tangent(_TRIALS, material), across.reshape(-1, 9)).reshape(-1, 3, 3)
     for what, found, expected in (("stress", power, slope), ("tangent", rate, change)):
         apart = float(np.abs(found - expected).max())
-        if not apart <= _APART * max(scale, float(np.abs(expected).max())):
+        if not apart <= _APART * max(material.young_modulus_kpa, float(np.abs(expected).max())):
             of = "energy" if what == "stress" else "stress"
             raise BadInput(f"Material law {material.law!r} is wrong: its {what} is not the derivative of its {of}.")
     return law

@@ -14,7 +14,7 @@ from glisson.studies.study import Conclusion
 from glisson.studies.tables import as_csv
 
 CASES, QUICK_CASES = 210, 8
-"""Some of which are impossible: their lever would cut into a part of the liver that is held."""
+"""Some are impossible, which is told before any load step: their lever would cut into a part that is held."""
 
 _EDGE_MM, _QUICK_EDGE_MM = 24.0, 40.0
 """About 4,500 and 2,000 quadratic elements."""
@@ -46,7 +46,8 @@ class LiftRobustness:
     def conclude(self, prepared: Mapping[str, Outcome], done: Mapping[str, Outcome]) -> Conclusion:
         """Counts, and a row for each lift."""
         drawn = [_row(case, done[point.key]) for case, point in self._lifts if point.key in done]
-        rows = [row for row in drawn if row["status"] != Status.BAD_INPUT]
+        impossible = [row for row in drawn if row["status"] == Status.BAD_INPUT and row["load_steps"] == 0]
+        rows = [row for row in drawn if row not in impossible]
         good = [row for row in rows if row["status"] == "converged"]
         values: dict[str, Any] = {
             "rows": rows,
@@ -57,7 +58,7 @@ class LiftRobustness:
             "node_gap_mm": min((row["node_gap_mm"] for row in good), default=None),
             "penetrated": sum(row["least_gap_mm"] is not None and row["least_gap_mm"] <= 0.0 for row in good),
             "failed": [row for row in rows if row["status"] != "converged"],
-            "impossible": [row for row in drawn if row["status"] == Status.BAD_INPUT],
+            "impossible": impossible,
             "unfinished": len(self._lifts) - len(drawn),
         }
         files = {"rows.csv": as_csv(rows, leave_out=("events",)), "report.html": as_page(values)}
