@@ -11,6 +11,7 @@ from problem import MEMBER, model_of, scenario
 
 from glisson.core.mesh import TetMesh
 from glisson.io.atomic import atomic_path
+from glisson.mechanics.faces import face_nodes
 from glisson.mechanics.loaded_body import loaded_body
 from glisson.mechanics.numbering import numbering
 from glisson.mechanics.quadratic_model import quadratic_model
@@ -35,7 +36,7 @@ def main(elements: int, element: str, target: Path) -> None:
         model = quadratic_model(model)
     mesh, order = model.mesh, numbering(model.mesh.nodes)
     body = loaded_body(order.model(model), scenario(), QuasiStaticParameters(element=element), REST_ACCURACY)
-    outside = np.union1d(np.unique(mesh.boundary()[0]), model.node_sets["back"])
+    outside = np.union1d(face_nodes(mesh), model.node_sets["back"])
     tumour = scanned_structures(build_anatomy(MEMBER).interior, None).tumours[0]
     near = np.linalg.norm(mesh.nodes - tumour.centroid_mm, axis=1) <= _WATCHED_MM
     with atomic_path(target) as path:

@@ -282,16 +282,17 @@ def test_meshes_are_the_same_everywhere(scripts):
         assert len(carried) > 10
 
 
-def test_a_lift_satisfies_its_judge_and_a_wrong_one_does_not(scripts, tmp_path):
+@pytest.mark.parametrize(("element", "elements"), [("T4", 2_000), ("T10", 1_000)])
+def test_a_lift_satisfies_its_judge_and_a_wrong_one_does_not(scripts, tmp_path, element, elements):
     scripts("lift")
     from glisson_engine import _solve
     from judge import judge
     from meshes import main
     from problem import load_problem
 
-    main(2_000, "T4", tmp_path / "mesh.npz")
+    main(elements, element, tmp_path / "mesh.npz")
     problem = load_problem(tmp_path / "mesh.npz")
-    lifted = _solve("quasi-static", "T4", problem.corner_mesh).displacement
+    lifted = _solve("quasi-static", element, problem.corner_mesh).displacement
     wrong, inverted = lifted.copy(), lifted.copy()
     wrong[problem.inside[0]] += 1.0
     inverted[problem.inside[0]] += 100.0
