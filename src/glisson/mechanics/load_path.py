@@ -25,6 +25,7 @@ _NO_NEAR_EQUILIBRIUM = (Status.ITERATION_LIMIT, Status.STAGNATED)
 _FLOW_SHARE = 0.5  # of a full load step: failing in larger ones may have other reasons
 _FLOW_MM = 0.06  # way of an organ on which a force as large as all others acts, in the first step of the flow
 _FLOW_STEPS = 40
+_DEEP = 1.0  # in ranges of the cushion
 _EASY = 12  # iterations of a step of the flow after which the drag fades faster
 _THICKEST = 1e3  # of the first drag
 _FIRMER = 2.0
@@ -103,8 +104,9 @@ class LoadPath:
             self.progress(reach, None)
             end = self.load_step(start.towards(goal, reach))
             if end.status in _NO_NEAR_EQUILIBRIUM and may_flow and (turn == 0.0 or share <= _FLOW_SHARE / steps):
-                end = self._flow(start.towards(goal, reach))
-                may_flow = end.status is Status.CONVERGED
+                flowed = self._flow(start.towards(goal, reach))
+                if flowed is not None:
+                    end, may_flow = flowed, flowed.status is Status.CONVERGED
             if end.status is Status.CONVERGED:
                 done = 1.0 if reach > 1.0 - 1e-9 else reach
                 self.accept(done, end)
@@ -122,7 +124,7 @@ class LoadPath:
         With a `margin`, as long as one has left no such share of the cushion.
         """
         body = self.body
-        end, penetrated = NewtonEnd(self.positions, Status.CONVERGED, 0, 0.0), self._penetrated(margin)
+        end, penetrated = NewtonEnd(self.positions, Status.CONVERGED, 0, 0.0), self._penetrated(self.positions, margin)
         for _ in range(_STIFFENINGS):
             if not penetrated:
                 break
@@ -132,8 +134,8 @@ class LoadPath:
             if end.status is not Status.CONVERGED:
                 return end
             self.accept(1.0, end)
-            penetrated = self._penetrated(margin)
-        if self._penetrated(0.0):
+            penetrated = self._penetrated(self.positions, margin)
+        if self._penetrated(self.positions, 0.0):
             return replace(end, status=Status.STAGNATED, reason="a tool stays inside the organ")
         return end
 
@@ -195,15 +197,18 @@ class LoadPath:
             self.body.accept(end.positions)
         return end
 
-    def _flow(self, goal: LoadState) -> NewtonEnd:
+    def _flow(self, goal: LoadState) -> NewtonEnd | None:
         """Equilibrium at the goal that is not near, as after a slip or a snap: the organ flows there.
 
         A drag as of a thick fluid makes every step small, anchors of friction follow, and the drag fades as the
-        organ comes to rest; the end is an equilibrium without it.
+        organ comes to rest; the end is an equilibrium without it. None where the tools would begin deep inside the
+        organ, which then would flow out of them and not along.
         """
         body = self.body
         memory, start, before = body.memory(), body.loading, self.positions
-        body.loading = goal
+        guess = self._clear_of_tools(goal)
+        if guess is None:
+            return None
         balance = body.balance(before, body.touches(before))
         volumes = lumped_volumes(body.elasticity.rest, body.elasticity.mesh)
         rate = highest = balance.scale / (_FLOW_MM * float(volumes.sum()))
@@ -211,12 +216,12 @@ class LoadPath:
         for number in range(_FLOW_STEPS):
             self.progress(None, f"the organ flows to another equilibrium, step {number + 1}")
             body.drag = Drag(rate * volumes, self.positions)
-            end = self.equilibrium(self.positions, exact=False)
+            end = self.equilibrium(guess, exact=False)
             iterations += end.iterations
             dragging = float(np.linalg.norm(body.drag.forces(end.positions)[~body.fixed]))
             body.drag = None
             if end.status is Status.CONVERGED:
-                self.positions = end.positions
+                guess = self.positions = end.positions
                 body.accept(end.positions)
                 if dragging < _ROUGH_TOLERANCE * balance.scale:
                     end = self.equilibrium(end.positions)
@@ -232,6 +237,22 @@ class LoadPath:
         body.recall(memory)
         return replace(end, positions=before, status=Status.ITERATION_LIMIT, iterations=iterations)
 
+    def _clear_of_tools(self, goal: LoadState) -> FloatArray | None:
+        """The first-order answer at the goal, or where the organ is; None where tools at the goal cut deep into both.
+
+        The goal's loads become the body's, unless None.
+        """
+        body = self.body
+        memory, start = body.memory(), body.loading
+        moved = self.newton.advance(self.positions, goal)
+        body.loading = goal
+        for guess in (None if moved is None else self._uninverted(moved), self.positions):
+            if guess is not None and not self._penetrated(guess, -_DEEP):
+                return guess
+        body.recall(memory)
+        body.loading = start
+        return None
+
     def _uninverted(self, moved: FloatArray) -> FloatArray | None:
         """As much of a first-order answer as inverts no element and cuts no surface; what is carried goes all its way.
 
@@ -245,9 +266,9 @@ class LoadPath:
             share /= 2.0
         return start if self.body.is_possible(start) else None
 
-    def _penetrated(self, margin: float) -> list[ToolContact]:
+    def _penetrated(self, positions: FloatArray, margin: float) -> list[ToolContact]:
         """Tools, other than yielding ones, inside which a surface point lies, or within that share of the cushion."""
-        points = self.body.surface.positions(self.positions)
+        points = self.body.surface.positions(positions)
         hard = [contact for contact in self.body.contacts if not contact.tool.yields]
         return [c for c in hard if float(c.gaps(points).min()) <= margin * c.cushion.range_mm]
 
