@@ -327,3 +327,9 @@ def test_mistakes_in_observations(tmp_path):
     (tmp_path / "o.json").write_text(json.dumps(values))
     with pytest.raises(BadInput, match=r"items\[1\]\.sigma_mm must be a finite number, not True"):
         read_observations(tmp_path / "o.json")
+
+
+def test_a_file_given_for_a_model_is_told(tmp_path):
+    write_model(tmp_path, model())
+    with pytest.raises(BadInput, match=r"model\.vtu is a file; give the folder with model\.vtu and model\.json"):
+        read_model(tmp_path / "model.vtu")

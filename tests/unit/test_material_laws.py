@@ -38,6 +38,16 @@ def test_a_wrong_law_is_told(law, words, monkeypatch):
         laws.law_of(Material(law.__name__, 7.0, 0.45))
 
 
+def test_a_law_that_raises_is_named(monkeypatch):
+    class Raises(NeoHookean):
+        def stress(self, gradients, material):
+            raise KeyError("shear")
+
+    monkeypatch.setattr(laws, "find_law", lambda name: Raises(Raises.Parameters()))
+    with pytest.raises(BadInput, match=r"Material law 'raises' fails where it is tried \(KeyError: 'shear'\)"):
+        laws.law_of(Material("raises", 7.0, 0.45))
+
+
 @pytest.mark.parametrize("poisson_ratio", [-0.5, 0.0, 0.3, 0.45, 0.4999, 0.499999])
 @pytest.mark.parametrize("young_modulus_kpa", [1e-3, 7.0, 1e6])
 @pytest.mark.parametrize(

@@ -58,6 +58,8 @@ def test_a_force_is_balanced_after_the_cushion_was_stiffened(monkeypatch: pytest
     answer = lift(slab(7.0, (6, 2, 2)), LeverDrive("lever", force_n=0.47), cohesion_kpa=0.0)
     assert answer.status is Status.CONVERGED, answer.message
     assert stiffened
+    _loads, *shares = [step.fraction for step in answer.record if step.stage == "stage 1"]
+    assert shares == sorted(shares)
     lever = next(r for r in answer.stages[0].contacts if r.tool == "lever")
     assert lever.hinge_moment_nm == pytest.approx(0.47 * 0.070, rel=2e-3)
     assert lever.least_gap_mm > 0.0

@@ -94,8 +94,8 @@ def test_a_stage_without_equilibrium_keeps_its_status() -> None:
     answers = [
         solver.solve(slab(7.0, (4, 2, 1)), replace(LIFT, stages=stages))
         for solver in (
-            QuasiStatic(QuasiStaticParameters(element="T4")),
-            RegionOfInterest(RegionOfInterestParameters(element="T4")),
+            QuasiStatic(QuasiStaticParameters()),
+            RegionOfInterest(RegionOfInterestParameters()),
         )
     ]
     assert answers[0].status is answers[1].status

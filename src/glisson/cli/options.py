@@ -40,13 +40,14 @@ def add_technique_options(parser: argparse.ArgumentParser, sections: Sequence[st
         named = [listing.name for listing in listings if listing.kind == KINDS[section]]
         group = parser.add_argument_group(f"{section} (kept in case.toml)")
         group.add_argument(f"--{section}.technique", metavar="NAME", help=f"one of {', '.join(named)}")
-        explained: dict[str, list[str]] = {}
+        explained: dict[str, dict[str, list[str]]] = {}
         for name in named:
             for field in fields(technique_class(KINDS[section], name).Parameters):
-                explained.setdefault(field.name, []).append(f"{_explanation(field)} ({name})")
-        for name, sentences in explained.items():
-            flag = f"--{section}.{name.replace('_', '-')}"
-            group.add_argument(flag, dest=f"{section}.{name}", metavar="VALUE", help="; ".join(sentences))
+                explained.setdefault(field.name, {}).setdefault(_explanation(field), []).append(name)
+        for parameter, meanings in explained.items():
+            flag = f"--{section}.{parameter.replace('_', '-')}"
+            sentences = [f"{words} ({', '.join(techniques)})" for words, techniques in meanings.items()]
+            group.add_argument(flag, dest=f"{section}.{parameter}", metavar="VALUE", help="; ".join(sentences))
 
 
 def add_section_options(parser: argparse.ArgumentParser, sections: Sequence[str]) -> None:

@@ -24,5 +24,5 @@ COMMAND = Command(
     "  glisson simulate liver\n  glisson simulate liver --scenario.angle-deg 30 --simulate.element T4",
     _add_arguments,
     _run,
-    ("status", "message", "load_steps", "iterations", "events", "seconds"),
+    ("status", "message", "load_steps", "iterations", "events", "estimated_error_mm", "seconds"),
 )

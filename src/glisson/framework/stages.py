@@ -65,7 +65,11 @@ class SimulateStage(Stage):
         return [("solver", settings.choices["simulate"].technique), *(("material", law) for law in laws)]
 
     def run(self, case: Case, settings: Settings, out: Path, progress: Progress) -> Mapping[str, Any]:
-        """Solve; facts: message, load steps, events. A solve that did not converge is a `StageFailed`."""
+        """Solve; facts: message, load steps, events, the largest estimated error.
+
+        Raises:
+            StageFailed: the solver did not converge.
+        """
         solver = settings.choices["simulate"].make(SETTINGS, settings.seed)
         model, scenario = read_model(case.path(MODEL)), read_scenario(case.path(SCENARIO))
         deformation: Deformation = solver.solve(model, scenario, progress)
@@ -74,12 +78,14 @@ class SimulateStage(Stage):
         if not deformation.status.is_good:
             raise StageFailed(deformation.message or deformation.status.sentence, deformation.status)
         write_deformation(out / RESULTS, deformation)
+        error = deformation.estimated_error
         return {
             "status": str(deformation.status),
             "message": deformation.message,
             "load_steps": len(deformation.record),
             "iterations": sum(step.iterations for step in deformation.record),
             "events": [asdict(event) for event in deformation.events],
+            "estimated_error_mm": None if error is None else float(error.max()),
         }
 
 

@@ -41,6 +41,8 @@ def read_pair(folder: Path, name: str, kind: str, schema: int) -> Iterator[tuple
     Raises:
         BadInput: a file is absent, damaged or of a newer Glisson, or they do not belong together.
     """
+    if folder.is_file():
+        raise BadInput(f"{folder} is a file; give the folder with {name}.vtu and {name}.json.")
     mesh_path = folder / f"{name}.vtu"
     with decoding(mesh_path, "a VTU mesh"):
         cells = read_vtk_xml(mesh_path)

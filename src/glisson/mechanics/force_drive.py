@@ -39,9 +39,10 @@ def lift_by_force(path: LoadPath, lever: str, force_mn: float) -> NewtonEnd:
             reached = wanted - hinge_moment(body, number, end.positions)
             if reached >= -_FORCE_ACCURACY * wanted:
                 slope = (missing - reached) / turn
-                path.accept(1.0 - reached / wanted, end)
+                share = 1.0 - reached / wanted
+                path.accept(share, end)
                 # Now, because a stiffer cushion also pushes more.
-                end = path.without_penetration()
+                end = path.without_penetration(reach=share)
                 if end.status is not Status.CONVERGED:
                     return end
                 missing = wanted - hinge_moment(body, number, path.positions)

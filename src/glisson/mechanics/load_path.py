@@ -118,8 +118,8 @@ class LoadPath:
                 share /= 2.0
         return end
 
-    def without_penetration(self, margin: float = 0.0) -> NewtonEnd:
-        """Stiffen the cushions at the end of a stage as long as a surface point lies inside a tool.
+    def without_penetration(self, margin: float = 0.0, reach: float = 1.0) -> NewtonEnd:
+        """Stiffen the cushions as long as a surface point lies inside a tool, at a share of the way (at its end).
 
         With a `margin`, as long as one has left no such share of the cushion.
         """
@@ -133,7 +133,7 @@ class LoadPath:
             end = self.load_step(body.loading)
             if end.status is not Status.CONVERGED:
                 return end
-            self.accept(1.0, end)
+            self.accept(reach, end)
             penetrated = self._penetrated(self.positions, margin)
         if self._penetrated(self.positions, 0.0):
             return replace(end, status=Status.STAGNATED, reason="a tool stays inside the organ")

@@ -20,12 +20,9 @@ REST_ACCURACY = 1e-8  # residual of the unloaded shape over the weight
 
 
 @dataclass(frozen=True)
-class QuasiStaticParameters:
-    """How exactly and in which steps the quasi-static solver works."""
+class StageParameters:
+    """How exactly and in which steps stages are solved."""
 
-    element: str = parameter(
-        "T10", "element: T10 (quadratic) or T4 (locks near incompressibility)", choices=("T4", "T10")
-    )
     tolerance: float = parameter(1e-6, "residual over the largest force at which a step has converged", 1e-12, 1e-3)
     step_deg: float = parameter(8.0, "largest turn of a lever in one load step, in degrees", 0.05, 15.0)
     contact_range_mm: float = parameter(0.1, "gap in mm at which a tool begins to press", 1e-3, 2.0)
@@ -35,6 +32,15 @@ class QuasiStaticParameters:
     )
     self_contact: bool = parameter(False, "whether parts of the organ's surface keep each other off (needs ipctk)")
     iteration_limit: int = parameter(25, "Newton iterations allowed in one load step", 1, 10_000)
+
+
+@dataclass(frozen=True)
+class QuasiStaticParameters(StageParameters):
+    """Those of the stages, and the element."""
+
+    element: str = parameter(
+        "T10", "element: T10 (quadratic) or T4 (locks near incompressibility)", choices=("T4", "T10")
+    )
 
 
 class QuasiStatic:
@@ -69,7 +75,7 @@ class QuasiStatic:
 def solve_stages(
     model: Model,
     scenario: Scenario,
-    parameters: QuasiStaticParameters,
+    parameters: StageParameters,
     carrier: Carrier,
     rest_accuracy: float,
     progress: Progress,

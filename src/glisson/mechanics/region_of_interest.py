@@ -1,6 +1,6 @@
 """The technique that solves with quadratic elements only where the organ moves."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import ClassVar
 
 from glisson.core.arrays import FloatArray
@@ -14,7 +14,7 @@ from glisson.mechanics.load_path import LoadPath
 from glisson.mechanics.newton import NewtonEnd
 from glisson.mechanics.numbering import numbering
 from glisson.mechanics.quadratic_model import linear_model, quadratic_model, with_middles
-from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters, solve_stages
+from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters, StageParameters, solve_stages
 from glisson.mechanics.region_first import RegionFirst, Way
 
 _SURVEY_TOLERANCE = 1e-2
@@ -22,8 +22,8 @@ _REST_ACCURACY = 1e-3  # leaves the scanned shape out of equilibrium by a hundre
 
 
 @dataclass(frozen=True)
-class RegionOfInterestParameters(QuasiStaticParameters):
-    """Those of the quasi-static technique, and what counts as still; `element` is that of the region."""
+class RegionOfInterestParameters(StageParameters):
+    """Those of the stages, and what counts as still."""
 
     still_mm: float = parameter(
         12.0, "motion in mm of linear elements up to which they are not replaced by others on the way", 0.0, 1000.0
@@ -50,7 +50,7 @@ class RegionOfInterest:
         return ()
 
     def solve(self, model: Model, scenario: Scenario, progress: Progress = silent) -> Deformation:
-        """Deformation through all stages, with an estimate of what the cut costs.
+        """Deformation through all stages on a T10 mesh, with an estimate of what the cut costs.
 
         Where the survey finds no equilibrium, the whole organ is solved as by `QuasiStatic`.
 
@@ -61,7 +61,7 @@ class RegionOfInterest:
         linear, corners = linear_model(model)
         order = numbering(linear.mesh.nodes)
         surveyor = _Surveyor()
-        loose = replace(parameters, element="T4", tolerance=max(parameters.tolerance, _SURVEY_TOLERANCE))
+        loose = replace(parameters, tolerance=max(parameters.tolerance, _SURVEY_TOLERANCE))
         survey = solve_stages(
             order.model(linear),
             _surveyed(scenario),
@@ -71,9 +71,8 @@ class RegionOfInterest:
             lambda fraction, words: progress(None, f"survey, {words}"),
         )
         if not survey.status.is_good:
-            return QuasiStatic(parameters).solve(model, scenario, progress)
-        if parameters.element == "T10":
-            model = quadratic_model(model)
+            return QuasiStatic(_of_the_whole(parameters)).solve(model, scenario, progress)
+        model = quadratic_model(model)
         ways = {}
         final = numbering(model.mesh.nodes)
         for key, way in surveyor.ways.items():
@@ -100,6 +99,10 @@ class _Surveyor:
         stage = path.history.stage
         self.ways[stage, sum(name == stage for name, _ in self.ways)] = path.steps
         return end
+
+
+def _of_the_whole(parameters: RegionOfInterestParameters) -> QuasiStaticParameters:
+    return QuasiStaticParameters(**{field.name: getattr(parameters, field.name) for field in fields(StageParameters)})
 
 
 def _surveyed(scenario: Scenario) -> Scenario:

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from glisson.core.arrays import FloatArray
 from glisson.core.errors import BadInput
 from glisson.core.model import Material
 from glisson.core.protocols import MaterialLaw
@@ -72,16 +73,26 @@ def law_of(material: Material) -> MaterialLaw:
     """
     law = find_law(material.law)
     law.check(material)
-    across = np.random.default_rng(0).normal(size=_TRIALS.shape)
-    ahead, behind = _TRIALS + _STEP * across, _TRIALS - _STEP * across
-    with np.errstate(all="ignore"):
-        slope = (law.energy(ahead, material) - law.energy(behind, material)) / (2.0 * _STEP)
-        power = np.einsum("nij,nij->n", law.stress(_TRIALS, material), across)
-        change = (law.stress(ahead, material) - law.stress(behind, material)) / (2.0 * _STEP)
-        rate = np.einsum("nab,nb->na", law.tangent(_TRIALS, material), across.reshape(-1, 9)).reshape(-1, 3, 3)
+    try:
+        power, slope, rate, change = _derivatives(law, material)
+    except Exception as error:  # a law from outside may raise anything
+        reason = f"{type(error).__name__}: {error}"
+        raise BadInput(f"Material law {material.law!r} fails where it is tried ({reason}).") from error
     for what, found, expected in (("stress", power, slope), ("tangent", rate, change)):
         apart = float(np.abs(found - expected).max())
         if not apart <= _APART * max(material.young_modulus_kpa, float(np.abs(expected).max())):
             of = "energy" if what == "stress" else "stress"
             raise BadInput(f"Material law {material.law!r} is wrong: its {what} is not the derivative of its {of}.")
     return law
+
+
+def _derivatives(law: MaterialLaw, material: Material) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Along a direction: power (n,) and energy's slope (n,), tangent's rate (n, 3, 3) and stress's change (n, 3, 3)."""
+    across = np.random.default_rng(0).normal(size=_TRIALS.shape)
+    ahead, behind = _TRIALS + _STEP * across, _TRIALS - _STEP * across
+    with np.errstate(all="ignore"):
+        power = np.einsum("nij,nij->n", law.stress(_TRIALS, material), across)
+        slope = (law.energy(ahead, material) - law.energy(behind, material)) / (2.0 * _STEP)
+        rate = np.einsum("nab,nb->na", law.tangent(_TRIALS, material), across.reshape(-1, 9)).reshape(-1, 3, 3)
+        change = (law.stress(ahead, material) - law.stress(behind, material)) / (2.0 * _STEP)
+    return power, slope, rate, change
