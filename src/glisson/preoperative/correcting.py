@@ -7,8 +7,11 @@ from glisson.core.arrays import FloatArray
 from glisson.core.errors import BadInput
 from glisson.preoperative.shape_blending import Correction, blended_slice, neighbours
 
-_FIRST = 6
-"""Slices that are spread over the organ before others are chosen by what they showed."""
+_FIRST = 20
+"""One slice of so many is spread over the organ before others are chosen by what these showed …"""
+
+_LEAST = 3
+""" … and at least."""
 
 _UNSEEN = 0.03
 """Of a slice's area that is taken to be wrong even where corrections found nothing wrong."""
@@ -84,11 +87,10 @@ class Correcting:
         """
         organ = np.flatnonzero(self._automatic.any(axis=(0, 1)))
         first, last = int(organ[0]), int(organ[-1])
-        if len(self._corrections) < _FIRST:
-            places = first + (np.arange(_FIRST) + 0.5) * (last + 1 - first) / _FIRST
-            left = [int(place) for place in places if int(place) not in self._corrections]
-            if left:
-                return left[0]
+        count = max(round((last + 1 - first) / _FIRST), _LEAST)
+        if len(self._corrections) < count:
+            places = first + (np.arange(count) + 0.5) * (last + 1 - first) / count
+            return next(int(place) for place in places if int(place) not in self._corrections)
         numbers = range(max(first - _BEYOND, 0), min(last + 1 + _BEYOND, self._automatic.shape[2]))
         open_ones = [number for number in numbers if number not in self._corrections]
         return max(open_ones, key=self._expected_error, default=first)
