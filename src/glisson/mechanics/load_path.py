@@ -208,6 +208,8 @@ class LoadPath:
         memory, start, before = body.memory(), body.loading, self.positions
         guess = self._clear_of_tools(goal)
         if guess is None:
+            body.recall(memory)
+            body.loading = start
             return None
         balance = body.balance(before, body.touches(before))
         volumes = lumped_volumes(body.elasticity.rest, body.elasticity.mesh)
@@ -240,17 +242,13 @@ class LoadPath:
     def _clear_of_tools(self, goal: LoadState) -> FloatArray | None:
         """The first-order answer at the goal, or where the organ is; None where tools at the goal cut deep into both.
 
-        The goal's loads become the body's, unless None.
+        The goal's loads become the body's in any case.
         """
-        body = self.body
-        memory, start = body.memory(), body.loading
         moved = self.newton.advance(self.positions, goal)
-        body.loading = goal
+        self.body.loading = goal
         for guess in (None if moved is None else self._uninverted(moved), self.positions):
             if guess is not None and not self._penetrated(guess, -_DEEP):
                 return guess
-        body.recall(memory)
-        body.loading = start
         return None
 
     def _uninverted(self, moved: FloatArray) -> FloatArray | None:

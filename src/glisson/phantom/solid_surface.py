@@ -13,6 +13,6 @@ def solid_surface(solid: Solid, step_mm: float) -> TriangleSurface:
     count = np.ceil((high - low) / step_mm).astype(int) + 1
     axes = [low[a] + step_mm * np.arange(count[a]) for a in range(3)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    vertices, triangles, _, _ = marching_cubes(solid.distance(grid), 0.0, spacing=(step_mm,) * 3)  # type: ignore[no-untyped-call]
+    vertices, triangles, _, _ = marching_cubes(solid.distance(grid), 0.0, spacing=(step_mm,) * 3)
     surface = TriangleSurface(vertices + low, triangles)
     return surface if surface.volume_mm3 > 0.0 else TriangleSurface(surface.vertices, triangles[:, ::-1])

@@ -86,7 +86,7 @@ def _skeleton_points(mask: NDArray[np.bool_], grid: Grid) -> tuple[FloatArray, F
     if not box:
         return np.zeros((0, 3)), np.zeros(0)
     filled = np.pad(ndimage.binary_fill_holes(mask[box[0]]), 1)
-    cells = np.argwhere(skeletonize(filled))  # type: ignore[no-untyped-call]
+    cells = np.argwhere(skeletonize(filled))
     inner = ndimage.distance_transform_edt(filled, sampling=grid.spacing_mm)
     least = float(grid.spacing_mm.min())
     radii = np.maximum(inner[tuple(cells.T)] - 0.5 * least, 0.5 * least)

@@ -103,9 +103,8 @@ class Correcting:
 
     def _renew(self, number: int) -> None:
         """Make the slices anew for which a correction of this one counts."""
-        others = [k for k in self._corrections if k != number]
-        low = max((k for k in others if k < number), default=-1)
-        high = min((k for k in others if k > number), default=self._automatic.shape[2])
+        low = max((k for k in self._corrections if k < number), default=-1)
+        high = min((k for k in self._corrections if k > number), default=self._automatic.shape[2])
         for k in range(low + 1, high):
             near = neighbours(self._corrections, k)
             if k in self._corrections:

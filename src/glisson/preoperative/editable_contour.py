@@ -10,7 +10,7 @@ from skimage.measure import find_contours
 
 from glisson.core.arrays import FloatArray
 from glisson.core.errors import BadInput
-from glisson.preoperative.snake import spread_evenly
+from glisson.preoperative.outline_spline import spread_evenly
 
 _FEWEST = 4
 _GROWTH = 1.25
@@ -66,7 +66,7 @@ class EditableContour:
         """Pixels (row, column) whose centres lie inside; spacing (2,) of rows and columns."""
         spacing = np.asarray(spacing_mm, dtype=np.float64)
         polygon = self.outline_mm(_FINE * float(spacing.min())) / spacing
-        inside: NDArray[np.bool_] = polygon2mask(shape, polygon)  # type: ignore[no-untyped-call]
+        inside: NDArray[np.bool_] = polygon2mask(shape, polygon)
         return inside
 
 
@@ -81,7 +81,7 @@ def contours_of(mask: NDArray[np.bool_], spacing_mm: FloatArray, tolerance_mm: f
     spacing = np.asarray(spacing_mm, dtype=np.float64)
     found = []
     padded = np.pad(mask, 1).astype(np.float64)
-    for border in find_contours(padded, 0.5):  # type: ignore[no-untyped-call]
+    for border in find_contours(padded, 0.5):
         points = (border[:-1] - 1.0) * spacing
         if len(points) >= _FEWEST and _area(points) < 0.0:
             found.append(points)

@@ -53,7 +53,7 @@ def reachable_region(
     markers, count = ndimage.label((width == ndimage.maximum_filter(width, size=tuple(size))) & (width > 0.0))
     if count == 0:
         return np.zeros(band.shape, dtype=bool)
-    basins = watershed(-width, markers, mask=filled).astype(np.int64)  # type: ignore[no-untyped-call]
+    basins = watershed(-width, markers, mask=filled).astype(np.int64)
     values = np.where(band, smooth, np.float32(prior.mean))
     joined = _joined_basins(basins, count, width, values)
     own = {int(joined[_nearest_label(basins, seed, spacing_mm)]) for seed in seeds}

@@ -6,10 +6,9 @@ are spread again where they have become uneven. The ends of an open snake stay w
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 from scipy.sparse import csr_array, diags_array, eye_array
 from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
@@ -17,9 +16,9 @@ from scipy.spatial import cKDTree
 from glisson.core.arrays import FloatArray
 from glisson.core.errors import BadInput
 from glisson.core.parameters import parameter
+from glisson.preoperative.outline_spline import spread_evenly
 from glisson.preoperative.snake_energy import SnakeEnergy
 
-_FEWEST = 8  # points of a snake
 _UNEVEN = 1.5
 _FINE = 0.2
 
@@ -79,22 +78,6 @@ def run_snake(
     return SnakeResult(points, iterations, float(way.mean()), rests)
 
 
-def spread_evenly(points_mm: FloatArray, spacing_mm: float, closed: bool) -> FloatArray:
-    """Points (m, 2) at about that distance on the cubic spline through points (n, 2)."""
-    knots = np.vstack([points_mm, points_mm[:1]]) if closed else points_mm
-    places = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(knots, axis=0), axis=1))])
-    knots, places = knots[_apart(places)], places[_apart(places)]
-    spline = CubicSpline(places, knots, bc_type="periodic" if closed else "natural")
-    count = max(round(places[-1] / spacing_mm), _FEWEST)
-    even: FloatArray = spline(np.linspace(0.0, places[-1], count + 1))
-    return even[:-1] if closed else even
-
-
-def _apart(places: FloatArray) -> NDArray[np.bool_]:
-    """Where the next knot is another one: whoever draws may click twice."""
-    return np.append(np.diff(places) > 1e-9 * places[-1], True)
-
-
 def _is_even(points: FloatArray, spacing_mm: float, closed: bool) -> bool:
     """Whether no distance is far from the wanted one; else the differences below would be wrong."""
     ends = np.vstack([points, points[:1]]) if closed else points
@@ -117,12 +100,12 @@ def _step(energy: SnakeEnergy, points: FloatArray, parameters: SnakeParameters, 
     return moved
 
 
+@lru_cache(maxsize=8)
 def _differences(count: int, closed: bool) -> tuple[csr_array, csr_array]:
     """First and second differences along a snake of so many points."""
-    ahead = diags_array([-np.ones(count), np.ones(count - 1)], offsets=[0, 1]).tolil()
+    ones = np.ones(count)
     if closed:
-        ahead[-1, 0] = 1.0
-        first = ahead.tocsr()
+        first = csr_array(diags_array([-ones, ones[1:], ones[:1]], offsets=[0, 1, 1 - count]))
         return first, first.T @ first
-    first = ahead.tocsr()[:-1]
+    first = csr_array(diags_array([-ones, ones[1:]], offsets=[0, 1]))[:-1]
     return first, first[:-1, :-1] @ first

@@ -80,7 +80,7 @@ class MarchingCubes:
         padded = np.pad(mask[box].astype(np.float32), [(m, m) for m in margin])
         smooth = ndimage.gaussian_filter(padded, sigma, truncate=3.0) if sigma.any() else padded
         level = _level_enclosing(smooth, int(mask.sum()))
-        indices, triangles, _, _ = marching_cubes(smooth, level, gradient_direction="descent")  # type: ignore[no-untyped-call]
+        indices, triangles, _, _ = marching_cubes(smooth, level, gradient_direction="descent")
         start = np.array([low for low, _ in corner]) - margin
         vertices = grid.points_from_indices(indices.astype(np.float64) + start)
         faces = triangles.astype(np.int64)
