@@ -48,6 +48,15 @@ def test_product(cores: int, banded: bool) -> None:
     np.testing.assert_allclose(found.ravel(), matrix @ values.ravel(), atol=1e-11)
 
 
+def test_product_of_two_matrices(cores: int) -> None:
+    """By rows on several cores it is SciPy's own, though blocks of the second are of another size."""
+    matrix = _matrix(60, banded=True)
+    other = bsr_matrix(np.random.default_rng(2).normal(size=(180, 48)), blocksize=(3, 6))
+    found = block_rows.times(matrix, other)
+    assert (found.shape, found.blocksize) == ((180, 48), (3, 6))
+    np.testing.assert_allclose(found.toarray(), (matrix @ other).toarray(), atol=1e-11)
+
+
 @pytest.mark.parametrize("banded", [True, False])
 def test_sweeps_are_those_of_one_core(cores: int, banded: bool) -> None:
     """Block Gauss–Seidel in the order of the pattern, with triangles that SciPy and NumPy make of the matrix."""

@@ -9,6 +9,7 @@ import numpy as np
 from glisson.core.arrays import FloatArray
 from glisson.core.deformation import Event, LoadStep
 from glisson.core.status import Status
+from glisson.mechanics.bend import Bend
 from glisson.mechanics.body import Body, Drag, LoadState
 from glisson.mechanics.contact import ToolContact
 from glisson.mechanics.elements import lumped_volumes
@@ -88,7 +89,7 @@ class LoadPath:
         Leaves in `steps` the shares of the way and the positions (n, 3) of the equilibria on it.
         """
         self.steps = []
-        start = self.body.loading
+        start, origin = self.body.loading, self.positions
         turn = max((abs(b - a) for a, b in zip(start.tools.angles, goal.tools.angles, strict=True)), default=0.0)
         steps = max(int(np.ceil(turn / self.step_rad - 1e-9)), 1)
         heavier = np.linalg.norm(goal.external - start.external) > 1e-9 * np.linalg.norm(goal.external)
@@ -102,7 +103,7 @@ class LoadPath:
         while done < 1.0:
             reach = min(done + share, 1.0)
             self.progress(reach, None)
-            end = self.load_step(start.towards(goal, reach))
+            end = self.load_step(start.towards(goal, reach), self._bend(reach - done, done, origin))
             if end.status in _NO_NEAR_EQUILIBRIUM and may_flow and (turn == 0.0 or share <= _FLOW_SHARE / steps):
                 flowed = self._flow(start.towards(goal, reach))
                 if flowed is not None:
@@ -156,7 +157,14 @@ class LoadPath:
                 return replace(end, iterations=iterations)
             end = newton.solve(end.positions, _ROUGH_TOLERANCE if lost or not exact else None)
 
-    def load_step(self, goal: LoadState) -> NewtonEnd:
+    def _bend(self, share: float, done: float, origin: FloatArray) -> Bend | None:
+        """What the last load step tells of the next one, a share of the way; None where contact makes that rough."""
+        if not self.steps or self.body.contacts:
+            return None
+        before, positions = self.steps[-2] if len(self.steps) > 1 else (0.0, origin)
+        return Bend(share / (done - before), self.positions - positions)
+
+    def load_step(self, goal: LoadState, bend: Bend | None = None) -> NewtonEnd:
         """Equilibrium at the goal; tools, loads and anchors are put back where it is not reached."""
         body = self.body
         memory, start = body.memory(), body.loading
@@ -164,6 +172,9 @@ class LoadPath:
         if moved is None:
             end = NewtonEnd(self.positions, Status.STAGNATED, 0, float("nan"))
         else:
+            if bend is not None:
+                bent = bend.bent(self.positions, moved)
+                moved = bent if body.is_possible(bent) else moved
             start_at = self._uninverted(moved)
             if start_at is None:
                 end = NewtonEnd(self.positions, Status.INVERTED, 0, float("nan"))

@@ -27,7 +27,9 @@ _RENEWALS = 12  # iterations in which points that leave lose their cohesion at o
 _PATCHED_HALVINGS = 6
 _LONGEST_PAUSE = 7  # iterations between attempts at exact contact that failed
 _INNER_TOLERANCE = 0.1  # of the outer one
-_FIRST_ACCURACY = 0.1  # of the first-order answer to a load step
+_FIRST_ACCURACY = (
+    1e-3  # of the first-order answer to a load step; a rough one moves the organ only beside what is carried
+)
 _LOOSEST = 0.1  # accuracy of a Newton step
 _LOOSE_STEPS = 8  # steps in a row of a body that nothing holds, before its free motion is looked for
 
@@ -146,13 +148,14 @@ class Newton:
         body.renew_cohesion(positions)
         touches = body.touches(positions)
         balance = body.balance(positions, touches)
-        change = body.load_change(positions, goal)
+        change, blocks = body.load_change(positions, goal), None
         if carried.any():
-            change = change - self._pull(positions, touches, carried)
+            blocks = body.stiffness(positions, touches, project=False)
+            change = change - (body.matrix(blocks) @ carried.ravel()).reshape(carried.shape)
         change = np.where(body.fixed, 0.0, change)
         if patch is None:
             forces = balance.unbalanced + change
-            direction = self._direction(positions, touches, forces, _FIRST_ACCURACY)
+            direction = self._direction(positions, touches, forces, _FIRST_ACCURACY, blocks)
             step = None if direction is None else direction.step
         else:
             answer = self._condenser.step(
@@ -163,13 +166,6 @@ class Newton:
             return None
         body.loading = goal
         return positions if step is None else positions + step + carried
-
-    def _pull(self, positions: FloatArray, touches: Sequence[Touch], carried: FloatArray) -> FloatArray:
-        """Forces (n, 3) in mN with which the body resists the motion (n, 3) of what is carried."""
-        body = self._body
-        blocks = body.stiffness(positions, touches, project=False)
-        pull: FloatArray = (body.matrix(blocks) @ carried.ravel()).reshape(carried.shape)
-        return pull
 
     def _patched(
         self, positions: FloatArray, touches: Sequence[Touch], balance: Balance, exact: bool
@@ -210,16 +206,21 @@ class Newton:
         return min(1.0, self._longest_step_mm / longest) if longest > 0.0 else 1.0
 
     def _direction(
-        self, positions: FloatArray, touches: Sequence[Touch], forces: FloatArray, accuracy: float
+        self,
+        positions: FloatArray,
+        touches: Sequence[Touch],
+        forces: FloatArray,
+        accuracy: float,
+        exact: FloatArray | None = None,
     ) -> _Direction | None:
-        """Newton's direction; the stiffness is made definite only when Cholesky refuses the exact one.
+        """Newton's direction; the stiffness is made definite only when Cholesky refuses the `exact` one.
 
         A body that would fly away is first glued to the tools it nearly touches, until their pressure, and with
         it their friction, has come to bear.
         """
         body = self._body
         for project in (False, True):
-            blocks = body.stiffness(positions, touches, project)
+            blocks = exact if exact is not None and not project else body.stiffness(positions, touches, project)
             direction = self._solved(positions, blocks, forces, accuracy)
             if direction is not None:
                 break

@@ -16,7 +16,7 @@ from scipy.sparse import bsr_matrix, csr_matrix
 from threadpoolctl import threadpool_limits
 
 from glisson.core.arrays import FloatArray
-from glisson.mechanics.block_rows import BlockRows
+from glisson.mechanics.block_rows import BlockRows, times
 from glisson.mechanics.pattern import Stiffness
 from glisson.mechanics.symmetric_rows import HalfPattern, SymmetricRows
 
@@ -59,7 +59,7 @@ class Multigrid:
             ways = BlockRows.of(restriction, np.float32), BlockRows.of(prolongation, np.float32)
             self._levels.append(_Level(rows, inverses, *ways))
             size = modes.shape[1]
-            fine = (restriction @ (fine @ prolongation)).tobsr((size, size))
+            fine = times(restriction, times(fine, prolongation)).tobsr((size, size))
             fine.sort_indices()
             if fine.shape[0] <= _COARSEST:
                 break
@@ -127,7 +127,7 @@ def _coarsen(matrix: bsr_matrix, inverses: Single, modes: FloatArray) -> tuple[b
     tentative, coarse_modes = fit_candidates(groups, modes)
     scaling = bsr_matrix((inverses.astype(np.float64), np.arange(len(inverses)), np.arange(len(inverses) + 1)))
     largest = _largest_eigenvalue(scaling, matrix)
-    correction = scaling @ (matrix @ tentative).tobsr((3, modes.shape[1]))
+    correction = scaling @ times(matrix, tentative).tobsr((3, modes.shape[1]))
     prolongation = tentative - (_OVERSHOOT / largest) * correction
     return prolongation.tobsr((size, modes.shape[1])), coarse_modes
 
