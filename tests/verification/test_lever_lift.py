@@ -9,6 +9,7 @@ from lifts import BOARD, DOWN, WIDE, lift, slab, slab_lever
 
 from glisson.core import BadInput, ContactLaw, Lever, LeverDrive, Scenario, Stage, Status
 from glisson.mechanics import loaded_body
+from glisson.mechanics.bend import Bend
 from glisson.mechanics.body import LoadState
 from glisson.mechanics.contact_law import Cushion
 from glisson.mechanics.load_path import LoadPath
@@ -89,11 +90,11 @@ def test_an_organ_that_flows_ends_where_it_would_have_gone_at_once(monkeypatch: 
     at_once = solver.solve(slab(7.0, (6, 2, 2)), scenario)
     load_step, flowed = LoadPath.load_step, []
 
-    def failing(path: LoadPath, goal: LoadState) -> NewtonEnd:
+    def failing(path: LoadPath, goal: LoadState, bend: Bend | None = None) -> NewtonEnd:
         if goal.tools.law.cohesion_kpa == 0.0 < path.body.law.cohesion_kpa:
             flowed.append(goal)
             return NewtonEnd(path.positions, Status.ITERATION_LIMIT, 0, 1.0)
-        return load_step(path, goal)
+        return load_step(path, goal, bend)
 
     monkeypatch.setattr(LoadPath, "load_step", failing)
     slowly = solver.solve(slab(7.0, (6, 2, 2)), scenario)
