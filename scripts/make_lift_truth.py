@@ -41,8 +41,8 @@ from glisson.phantom.truth_checks import (
     surface_nodes,
     tumour_motion,
 )
-from glisson.preoperative.attachments import DirectionAttachment, node_sets
-from glisson.preoperative.mmg import Mmg, MmgParameters
+from glisson.preoperative.meshing.mmg import Mmg, MmgParameters
+from glisson.preoperative.model.attachments import DirectionAttachment, node_sets
 
 DENSITY_KG_M3 = 1150.0
 ATTACHMENT = DirectionAttachment(reach=0.25, left_limit=0.5)

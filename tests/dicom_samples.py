@@ -212,14 +212,14 @@ def write_multiframe(path: Path, pixels: np.ndarray, order: list[int], step: flo
     dataset.file_meta.MediaStorageSOPClassUID = EnhancedCTImageStorage
     dataset.NumberOfFrames = len(order)
     shared = Dataset()
-    shared.PlaneOrientationSequence = _item(ImageOrientationPatient=list(AXIAL))
-    shared.PixelMeasuresSequence = _item(PixelSpacing=[0.8, 0.7], SliceThickness=step)
+    shared.PlaneOrientationSequence = item(ImageOrientationPatient=list(AXIAL))
+    shared.PixelMeasuresSequence = item(PixelSpacing=[0.8, 0.7], SliceThickness=step)
     dataset.SharedFunctionalGroupsSequence = Sequence([shared])
     frames = []
     for number in order:
         group = Dataset()
-        group.PlanePositionSequence = _item(ImagePositionPatient=[-30.0, 20.0, -40.0 + step * number])
-        group.PixelValueTransformationSequence = _item(RescaleSlope=2, RescaleIntercept=-1024 - number)
+        group.PlanePositionSequence = item(ImagePositionPatient=[-30.0, 20.0, -40.0 + step * number])
+        group.PixelValueTransformationSequence = item(RescaleSlope=2, RescaleIntercept=-1024 - number)
         frames.append(group)
     dataset.PerFrameFunctionalGroupsSequence = Sequence(frames)
     for keyword, value in tags.items():
@@ -228,8 +228,9 @@ def write_multiframe(path: Path, pixels: np.ndarray, order: list[int], step: flo
     dataset.save_as(path)
 
 
-def _item(**tags: Any) -> Sequence:
-    item = Dataset()
+def item(**tags: Any) -> Sequence:
+    """A sequence with one item of these tags."""
+    group = Dataset()
     for keyword, value in tags.items():
-        setattr(item, keyword, value)
-    return Sequence([item])
+        setattr(group, keyword, value)
+    return Sequence([group])

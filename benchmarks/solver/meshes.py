@@ -13,7 +13,7 @@ from problem import CLAMPED_BELOW_X_MM, PATCH_RADIUS_MM, SEMI_AXES_MM
 
 from glisson.core.mesh import TET_EDGES, TetMesh
 from glisson.io.atomic import atomic_path
-from glisson.preoperative.lattice import body_centred_lattice, inside_of_level
+from glisson.preoperative.meshing.lattice import body_centred_lattice, inside_of_level
 
 LATTICES = {
     8_057: (13.528, 0.29),

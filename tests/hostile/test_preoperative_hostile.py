@@ -3,19 +3,19 @@ import pytest
 import trimesh
 
 from glisson.core import BadInput, Grid, LabelMap, Model, StageFailed, Status, TetMesh, TriangleSurface, Volume
-from glisson.preoperative.attachments import (
+from glisson.preoperative.contours.localized_contour import LocalizedContourParameters, evolve
+from glisson.preoperative.liver.label_segmenter import LabelSegmenter, LabelSegmenterParameters
+from glisson.preoperative.liver.seeded_contour import SeededContour, SeededContourParameters
+from glisson.preoperative.meshing.mmg import Mmg, MmgParameters
+from glisson.preoperative.meshing.surface import MarchingCubes, MarchingCubesParameters
+from glisson.preoperative.model.attachments import (
     BoxAttachment,
     attachments_from_tables,
     node_sets,
 )
-from glisson.preoperative.label_segmenter import LabelSegmenter, LabelSegmenterParameters
-from glisson.preoperative.localized_contour import LocalizedContourParameters, evolve
-from glisson.preoperative.manoeuvre import propose_scenario
-from glisson.preoperative.mmg import Mmg, MmgParameters
-from glisson.preoperative.model_building import HUMAN_LIVER, ModelSettings, build_model
-from glisson.preoperative.seeded_contour import SeededContour, SeededContourParameters
-from glisson.preoperative.structures import build_structures
-from glisson.preoperative.surface import MarchingCubes, MarchingCubesParameters
+from glisson.preoperative.model.model_building import HUMAN_LIVER, ModelSettings, build_model
+from glisson.preoperative.model.structures import build_structures
+from glisson.preoperative.scenario.manoeuvre import propose_scenario
 from preoperative_shapes import LIVER_GRID, ellipsoid, labels_of, mask_of, two_lobes
 
 NO_SEED = np.zeros((0, 3))

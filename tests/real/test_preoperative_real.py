@@ -10,11 +10,11 @@ from glisson.core import LabelMap
 from glisson.geometry.distance import closest_points
 from glisson.io.dicom import read_dicom_mask
 from glisson.io.images import read_labels, read_volume
-from glisson.preoperative.label_segmenter import LabelSegmenter, LabelSegmenterParameters
-from glisson.preoperative.mmg import Mmg, MmgParameters
-from glisson.preoperative.model_building import ModelSettings, build_model
-from glisson.preoperative.seeded_contour import SeededContour, SeededContourParameters
-from glisson.preoperative.surface import MarchingCubes, MarchingCubesParameters
+from glisson.preoperative.liver.label_segmenter import LabelSegmenter, LabelSegmenterParameters
+from glisson.preoperative.liver.seeded_contour import SeededContour, SeededContourParameters
+from glisson.preoperative.meshing.mmg import Mmg, MmgParameters
+from glisson.preoperative.meshing.surface import MarchingCubes, MarchingCubesParameters
+from glisson.preoperative.model.model_building import ModelSettings, build_model
 from preoperative_shapes import dice
 
 pytestmark = pytest.mark.real

@@ -11,8 +11,8 @@ from glisson.core.parameters import parameter
 from glisson.framework import settings_file
 from glisson.framework.settings import CapsuleSettings, PlaneSettings, RodSettings, SegmentSettings, Settings
 from glisson.framework.settings_file import settings_from_table, settings_text
-from glisson.preoperative.attachments import BoxAttachment, DirectionAttachment
-from glisson.preoperative.lever_placement import LeverLiftParameters
+from glisson.preoperative.model.attachments import BoxAttachment, DirectionAttachment
+from glisson.preoperative.scenario.lever_placement import LeverLiftParameters
 
 
 @dataclass(frozen=True)

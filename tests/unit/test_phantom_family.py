@@ -8,17 +8,14 @@ from skimage.measure import marching_cubes
 from glisson.core import BadInput, Grid
 from glisson.core.mesh import TriangleSurface
 from glisson.geometry.distance import inside
+from glisson.phantom.appearance import PORTAL_PHASE
 from glisson.phantom.family import build_anatomy, make_phantom
-from glisson.phantom.scan import (
-    DUCT_HU,
-    GALLBLADDER_HU,
-    LIVER_HU,
-    NOISE_HU,
-    PORTAL_HU,
-    TUMOUR_HU,
-)
 
 SPACING = (2.0, 2.0, 2.5)
+LIVER_HU, PORTAL_HU, TUMOUR_HU, DUCT_HU, GALLBLADDER_HU = (
+    PORTAL_PHASE.values[name] for name in ("liver", "portal", "tumour", "duct", "gallbladder")
+)
+NOISE_HU = PORTAL_PHASE.noise
 
 
 @pytest.fixture(scope="module")

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 from skimage.segmentation import chan_vese
 
-from glisson.preoperative.diffusion import diffused
-from glisson.preoperative.localized_contour import (
+from glisson.preoperative.contours.localized_contour import (
     LocalizedContourParameters,
     ball_rows,
     curvatures,
@@ -11,7 +10,8 @@ from glisson.preoperative.localized_contour import (
     local_forces,
     smoothed_heaviside,
 )
-from glisson.preoperative.signed_distance import reinitialised, signed_distance_of_mask
+from glisson.preoperative.contours.signed_distance import reinitialised, signed_distance_of_mask
+from glisson.preoperative.imaging.diffusion import diffused
 from preoperative_shapes import dice
 
 ONE = np.ones(3)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from glisson.core.errors import BadInput
-from glisson.preoperative.correcting import Correcting
+from glisson.preoperative.correction.correcting import Correcting
 from preoperative_shapes import dice
 
 SPACING = np.array([1.0, 1.0, 2.0])

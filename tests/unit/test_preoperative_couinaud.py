@@ -8,8 +8,8 @@ import pytest
 from glisson.core.errors import BadInput
 from glisson.core.image import Grid, LabelMap
 from glisson.phantom.family import make_phantom
-from glisson.preoperative.resections import TABLE_1, adjoining_pairs, resection_volumes, resections
-from glisson.preoperative.territories import nearest_labels
+from glisson.preoperative.segments.resections import TABLE_1, adjoining_pairs, resection_volumes, resections
+from glisson.preoperative.segments.territories import nearest_labels
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from glisson.core.errors import BadInput
-from glisson.preoperative.editable_contour import EditableContour, contours_of
+from glisson.preoperative.correction.editable_contour import EditableContour, contours_of
 from preoperative_shapes import dice
 
 SPACING = np.array([0.8, 0.6])

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from glisson.core.mesh import TetMesh, signed_volumes
-from glisson.preoperative.lattice import body_centred_lattice, inside_of_level
-from glisson.preoperative.mesh_quality import smallest_dihedral_angles_deg
+from glisson.preoperative.meshing.lattice import body_centred_lattice, inside_of_level
+from glisson.preoperative.meshing.mesh_quality import smallest_dihedral_angles_deg
 
 LOW, HIGH = np.array([-20.0, -10.0, -15.0]), np.array([20.0, 10.0, 15.0])
 

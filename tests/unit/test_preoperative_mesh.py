@@ -11,8 +11,8 @@ import trimesh
 from skimage.measure import marching_cubes
 
 from glisson.core import TetMesh, TriangleSurface
-from glisson.preoperative.mesh_quality import face_connected_parts, mesh_quality, smallest_dihedral_angles_deg
-from glisson.preoperative.mmg import Mmg, MmgParameters
+from glisson.preoperative.meshing.mesh_quality import face_connected_parts, mesh_quality, smallest_dihedral_angles_deg
+from glisson.preoperative.meshing.mmg import Mmg, MmgParameters
 
 
 def sphere(radius: float = 40.0, subdivisions: int = 3) -> TriangleSurface:
@@ -91,7 +91,7 @@ def test_parts_that_share_an_edge_only_are_two():
 WAITING = """
 import numpy as np, trimesh
 from glisson.core import TriangleSurface
-from glisson.preoperative.mmg import Mmg, MmgParameters
+from glisson.preoperative.meshing.mmg import Mmg, MmgParameters
 made = trimesh.creation.icosphere(5, 100.0)
 surface = TriangleSurface(made.vertices, made.faces)
 first = []

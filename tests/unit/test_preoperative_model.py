@@ -6,20 +6,20 @@ from blocks import block
 from scipy.spatial.transform import Rotation
 
 from glisson.core import BadInput, Grid, LabelMap, Material, TetMesh
-from glisson.preoperative.attachments import (
+from glisson.preoperative.liver.label_segmenter import LabelSegmenter, LabelSegmenterParameters
+from glisson.preoperative.meshing.mmg import Mmg, MmgParameters
+from glisson.preoperative.meshing.surface import MarchingCubes, MarchingCubesParameters
+from glisson.preoperative.model.attachments import (
     BoxAttachment,
     DirectionAttachment,
     attachments_from_tables,
     ligaments,
     node_sets,
 )
-from glisson.preoperative.label_segmenter import LabelSegmenter, LabelSegmenterParameters
-from glisson.preoperative.lever_placement import LeverLiftParameters, place_lever
-from glisson.preoperative.manoeuvre import propose_scenario
-from glisson.preoperative.mmg import Mmg, MmgParameters
-from glisson.preoperative.model_building import ModelSettings, build_model
-from glisson.preoperative.regions import element_regions
-from glisson.preoperative.surface import MarchingCubes, MarchingCubesParameters
+from glisson.preoperative.model.model_building import ModelSettings, build_model
+from glisson.preoperative.model.regions import element_regions
+from glisson.preoperative.scenario.lever_placement import LeverLiftParameters, place_lever
+from glisson.preoperative.scenario.manoeuvre import propose_scenario
 from preoperative_shapes import LIVER_GRID, ellipsoid, labels_of, mask_of, two_lobes
 
 TUMOUR_MM = np.array([-35.0, 0.0, 5.0])

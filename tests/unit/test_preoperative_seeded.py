@@ -3,13 +3,13 @@ import pytest
 
 from glisson.core import Grid, LabelMap, Volume
 from glisson.phantom.family import make_phantom
-from glisson.preoperative.completion import surface_tumours
-from glisson.preoperative.intensity_prior import IntensityPrior, estimate_prior
-from glisson.preoperative.propagation import SliceContour
-from glisson.preoperative.reachable import reachable_region
-from glisson.preoperative.seeded_contour import SeededContour, SeededContourParameters
-from glisson.preoperative.slice_flags import flag_slices
-from glisson.preoperative.working_grid import WorkingGrid
+from glisson.preoperative.imaging.working_grid import WorkingGrid
+from glisson.preoperative.liver.completion import surface_tumours
+from glisson.preoperative.liver.intensity_prior import IntensityPrior, estimate_prior
+from glisson.preoperative.liver.propagation import SliceContour
+from glisson.preoperative.liver.reachable import reachable_region
+from glisson.preoperative.liver.seeded_contour import SeededContour, SeededContourParameters
+from glisson.preoperative.liver.slice_flags import flag_slices
 from preoperative_shapes import dice, ellipsoid, mask_of
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from glisson.core.errors import BadInput
-from glisson.preoperative.outline_spline import spread_evenly
-from glisson.preoperative.snake import SnakeParameters, run_snake
-from glisson.preoperative.snake_energy import SnakeEnergy, SnakeWeights
+from glisson.preoperative.contours.outline_spline import spread_evenly
+from glisson.preoperative.contours.snake import SnakeParameters, run_snake
+from glisson.preoperative.contours.snake_energy import SnakeEnergy, SnakeWeights
 
 SPACING = np.array([0.8, 0.7])
 

@@ -3,8 +3,8 @@ import pytest
 from scipy.spatial import cKDTree
 
 from glisson.core import Grid, LabelMap
-from glisson.preoperative.centrelines import centreline_trees
-from glisson.preoperative.structures import build_structures
+from glisson.preoperative.model.structures import build_structures
+from glisson.preoperative.vessels.centrelines import centreline_trees
 from preoperative_shapes import ellipsoid, labels_of, mask_of
 
 GRID = Grid((120, 60, 50), [1.0, 1.0, 1.6], [-60.0, -30.0, -40.0])

@@ -3,8 +3,8 @@ import pytest
 import trimesh
 
 from glisson.core import Grid, LabelMap
-from glisson.preoperative.borders import touched_borders
-from glisson.preoperative.surface import MarchingCubes, MarchingCubesParameters
+from glisson.preoperative.imaging.borders import touched_borders
+from glisson.preoperative.meshing.surface import MarchingCubes, MarchingCubesParameters
 from preoperative_shapes import ellipsoid, labels_of, mask_of
 
 ROTATED = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])

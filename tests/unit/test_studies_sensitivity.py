@@ -19,7 +19,7 @@ from glisson.core.mesh import TetMesh, TriangleSurface
 from glisson.core.model import Model
 from glisson.core.status import Status
 from glisson.core.structures import Tumour
-from glisson.preoperative.mmg import Mmg, MmgParameters
+from glisson.preoperative.meshing.mmg import Mmg, MmgParameters
 from glisson.studies import meshing
 from glisson.studies.lifts import rigidly_moved
 from glisson.studies.point import Outcome

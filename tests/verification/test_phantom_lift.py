@@ -7,9 +7,9 @@ import pytest
 from glisson.core import Model, Scenario, Status
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
 from glisson.phantom.demo import demo_phantom
-from glisson.preoperative.mmg import Mmg, MmgParameters
-from glisson.preoperative.model_building import HUMAN_LIVER, ModelSettings, build_model
-from glisson.preoperative.surface import MarchingCubes, MarchingCubesParameters
+from glisson.preoperative.meshing.mmg import Mmg, MmgParameters
+from glisson.preoperative.meshing.surface import MarchingCubes, MarchingCubesParameters
+from glisson.preoperative.model.model_building import HUMAN_LIVER, ModelSettings, build_model
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,8 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="PATH",
         nargs="+",
         default=[],
-        help="label maps on the scan's grid: files, folders of files, DICOM masks, folders of DICOM masks",
+        help="label maps whose voxels lie on the scan's: NIfTI, NRRD, .seg.nrrd or DICOM segmentations, folders of "
+        "such files, DICOM masks, folders of DICOM masks",
     )
     parser.add_argument(
         "--label-scheme",

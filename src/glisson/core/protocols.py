@@ -77,6 +77,22 @@ class Segmenter(Technique, Protocol):
         """
 
 
+class VesselSegmenter(Technique, Protocol):
+    """Finds vessels or ducts inside the organ (entry-point group `glisson.vessel_segmenters`)."""
+
+    def find(self, volume: Volume, organ: LabelMap, progress: Progress = silent) -> LabelMap:
+        """Tubes as {1: "vessel"} on the scan's grid.
+
+        Args:
+            volume: the scan.
+            organ: the organ ("liver") on the same grid.
+            progress: told how far it is.
+
+        Raises:
+            BadInput: the organ's mask is empty.
+        """
+
+
 class SurfaceExtractor(Technique, Protocol):
     """Makes a closed surface of a mask (entry-point group `glisson.surface_extractors`)."""
 

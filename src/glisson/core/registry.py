@@ -19,10 +19,12 @@ from glisson.core.protocols import (
     Solver,
     SurfaceExtractor,
     SurfaceReconstructor,
+    VesselSegmenter,
 )
 
 KINDS: dict[str, tuple[str, type[Any]]] = {
     "segmenter": ("glisson.segmenters", Segmenter),
+    "vessel-segmenter": ("glisson.vessel_segmenters", VesselSegmenter),
     "surface-extractor": ("glisson.surface_extractors", SurfaceExtractor),
     "mesher": ("glisson.meshers", Mesher),
     "material": ("glisson.materials", MaterialLaw),

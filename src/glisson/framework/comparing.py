@@ -7,8 +7,8 @@ from glisson.core.errors import BadInput
 from glisson.framework.case import ORGAN, Case
 from glisson.framework.segmentation_scores import SegmentationScores, segmentation_scores
 from glisson.io.images import read_label_maps, read_labels
-from glisson.io.label_groups import require_same_grid
-from glisson.preoperative.regions import ORGAN as LIVER
+from glisson.io.label_groups import on_grid_of
+from glisson.preoperative.model.regions import ORGAN as LIVER
 
 
 def compare_with_reference(case: Case, path: str | Path) -> SegmentationScores:
@@ -24,7 +24,7 @@ def compare_with_reference(case: Case, path: str | Path) -> SegmentationScores:
         named = maps[0]
     if named is None:
         raise BadInput(f"The reference {path} has no label {LIVER!r}; give a mask of the liver alone.")
-    require_same_grid(found, named, f"the reference {path}")
+    named = on_grid_of(found.grid, named, f"the reference {path}")
     label = LIVER if LIVER in named.names.values() else next(iter(named.names.values()))
     return segmentation_scores(found.mask(LIVER), named.mask(label), found.grid)
 

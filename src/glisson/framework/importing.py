@@ -14,7 +14,7 @@ from glisson.core.image import LabelMap, Volume
 from glisson.framework.case import ORGAN, SCAN, STRUCTURES, TUMOURS, Case, new_case, open_case
 from glisson.framework.settings import GIVEN_LABELS, Settings
 from glisson.io.images import read_label_maps, read_volume, write_labels, write_volume
-from glisson.io.label_groups import group_labels, require_same_grid
+from glisson.io.label_groups import group_labels, on_grid_of
 from glisson.io.label_names import canonical_name
 from glisson.io.totalsegmentator import class_names
 
@@ -45,8 +45,8 @@ def import_case(
     Args:
         folder: the case folder to make.
         scan: a DICOM folder, NIfTI or NRRD file.
-        labels: label maps on the scan's grid: files, a folder of such files, a DICOM mask folder, or a
-            folder of DICOM mask folders as of IRCAD.
+        labels: label maps whose voxels lie on the scan's: files, a folder of such files, a DICOM mask folder, or
+            a folder of DICOM mask folders as of IRCAD.
         scheme: how label files without names are numbered ("totalsegmentator").
         settings: those of the case; the segmenter becomes "labels" where the liver is among the labels.
 
@@ -90,10 +90,9 @@ def _known_labels(paths: Sequence[str | Path], scheme: str | None, volume: Volum
                 f"{path} has no label of a name that Glisson knows; name them liver, tumour1, portal, hepatic, duct "
                 "and so on, in the file or by the file's name."
             )
-        for labels in kept:
-            require_same_grid(volume, labels, f"the label map {path}")
+        placed = [on_grid_of(volume, labels, f"the label map {path}") for labels in kept]
         left_out += sum(len(labels.names) for labels in maps) - sum(len(labels.names) for labels in kept)
-        known += kept
+        known += placed
     return known, left_out
 
 

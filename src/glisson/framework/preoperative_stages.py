@@ -19,9 +19,9 @@ from glisson.framework.stage import Stage
 from glisson.io.images import read_labels, read_volume, write_labels
 from glisson.io.model_files import read_model, write_model
 from glisson.io.scenario_files import write_scenario
-from glisson.preoperative.manoeuvre import propose_scenario
-from glisson.preoperative.model_building import MeshReport, ModelSettings, build_model
-from glisson.preoperative.regions import ORGAN as LIVER
+from glisson.preoperative.model.model_building import MeshReport, ModelSettings, build_model
+from glisson.preoperative.model.regions import ORGAN as LIVER
+from glisson.preoperative.scenario.manoeuvre import propose_scenario
 
 
 class SegmentStage(Stage):

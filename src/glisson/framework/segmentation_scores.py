@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from skimage.morphology import skeletonize
 
 from glisson.core.arrays import FloatArray
 from glisson.core.errors import BadInput
@@ -46,6 +47,22 @@ def segmentation_scores(found: NDArray[np.bool_], reference: NDArray[np.bool_], 
     dice = 2.0 * float((a & b).sum()) / float(a.sum() + b.sum())
     distances = _surface_distances_mm(a, b, grid.spacing_mm)
     return SegmentationScores(dice, float(distances.mean()), float(np.percentile(distances, 95.0)))
+
+
+def centreline_dice(found: NDArray[np.bool_], reference: NDArray[np.bool_]) -> float:
+    """How much of each mask's skeleton lies in the other, harmonic mean (clDice; Shit et al., CVPR 2021).
+
+    Raises:
+        BadInput: a mask is empty.
+    """
+    if not found.any() or not reference.any():
+        raise BadInput("A mask of vessels is empty, so there is nothing to compare.")
+    box = ndimage.find_objects((found | reference).astype(np.uint8))[0]
+    a, b = np.pad(found[box], 1), np.pad(reference[box], 1)
+    skeleton_a, skeleton_b = skeletonize(a), skeletonize(b)
+    precision = float((skeleton_a & b).sum()) / float(skeleton_a.sum())
+    sensitivity = float((skeleton_b & a).sum()) / float(skeleton_b.sum())
+    return 2.0 * precision * sensitivity / max(precision + sensitivity, 1e-12)
 
 
 def _surface_distances_mm(a: NDArray[np.bool_], b: NDArray[np.bool_], spacing_mm: FloatArray) -> FloatArray:

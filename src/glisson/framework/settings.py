@@ -12,10 +12,10 @@ from glisson.core.errors import BadInput
 from glisson.core.model import Capsule, Material, Rod
 from glisson.core.parameters import build_parameters, parameter
 from glisson.core.registry import technique_class
-from glisson.preoperative.attachments import DEFAULT_ATTACHMENTS, Attachment
-from glisson.preoperative.lever_placement import LeverLiftParameters
-from glisson.preoperative.model_building import HUMAN_LIVER
-from glisson.preoperative.regions import ORGAN
+from glisson.preoperative.model.attachments import DEFAULT_ATTACHMENTS, Attachment
+from glisson.preoperative.model.model_building import HUMAN_LIVER
+from glisson.preoperative.model.regions import ORGAN
+from glisson.preoperative.scenario.lever_placement import LeverLiftParameters
 
 SCHEMA = 1
 """Version of the case folder that this Glisson writes, and the newest that it reads."""

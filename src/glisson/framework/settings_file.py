@@ -18,9 +18,14 @@ from glisson.framework.settings import (
     Settings,
     TechniqueChoice,
 )
-from glisson.preoperative.attachments import DEFAULT_ATTACHMENTS, Attachment, BoxAttachment, attachments_from_tables
-from glisson.preoperative.model_building import HUMAN_LIVER
-from glisson.preoperative.regions import ORGAN
+from glisson.preoperative.model.attachments import (
+    DEFAULT_ATTACHMENTS,
+    Attachment,
+    BoxAttachment,
+    attachments_from_tables,
+)
+from glisson.preoperative.model.model_building import HUMAN_LIVER
+from glisson.preoperative.model.regions import ORGAN
 
 _HEAD = """\
 # A Glisson case; docs/case-folder.md says more. Lengths in mm, stresses in kPa, densities in kg/m³, points LPS.

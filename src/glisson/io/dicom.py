@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from glisson.core import BadInput
+from glisson.core import BadInput, Grid
 from glisson.io.decoding import check_image_size, decoding
 from glisson.io.dicom_geometry import sorted_slices
 from glisson.io.dicom_headers import ImageFile, Slice, image_files, slices_of
@@ -30,7 +30,7 @@ def read_dicom_folder(folder: Path, series_uid: str | None = None) -> StoredImag
     Raises:
         BadInput: no series or several, tags missing, no regular grid, or pixels that cannot be decoded.
     """
-    with decoding(folder, "a DICOM folder"), _quiet():
+    with decoding(folder, "a DICOM folder"), quiet():
         files = _one_series(folder, series_uid)
         modality = files[0].modality
         if modality not in ("CT", "MR"):
@@ -44,7 +44,7 @@ def read_dicom_mask(folder: Path) -> StoredImage:
     Raises:
         BadInput: as for `read_dicom_folder`.
     """
-    with decoding(folder, "a DICOM mask"), _quiet():
+    with decoding(folder, "a DICOM mask"), quiet():
         slices, grid = _checked_slices(_one_series(folder, None), needs_rescale=False)
         voxels = np.zeros((len(slices), grid.shape[1], grid.shape[0]), dtype=np.uint8)
         for number, frame in _frames(slices):
@@ -54,14 +54,23 @@ def read_dicom_mask(folder: Path) -> StoredImage:
         return StoredImage(in_c_order(voxels.T), grid)
 
 
+def series_slices(folder: Path) -> tuple[list[Slice], Grid]:
+    """The slices of the one series in a folder in the order of their places, and the grid that they make.
+
+    Raises:
+        BadInput: as for `read_dicom_folder`.
+    """
+    return _checked_slices(_one_series(folder, None), needs_rescale=False)
+
+
 def has_dicom(folder: Path) -> bool:
     """Whether DICOM images lie directly in a folder."""
-    with _quiet():
+    with quiet():
         return next(image_files(folder), None) is not None
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
+def quiet() -> Iterator[None]:
     """Without pydicom's warnings on values that break the standard's letter: what matters is checked here."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -94,7 +103,7 @@ def _listed(files: list[ImageFile]) -> str:
     return "; ".join(parts[:12]) + ("; …" if len(parts) > 12 else "")
 
 
-def _checked_slices(files: list[ImageFile], needs_rescale: bool) -> tuple[list[Slice], Any]:
+def _checked_slices(files: list[ImageFile], needs_rescale: bool) -> tuple[list[Slice], Grid]:
     slices = [one for file in files for one in slices_of(file, needs_rescale)]
     first = slices[0]
     check_image_size((*first.shape, len(slices)), 2)

@@ -1,6 +1,6 @@
 """Scans and label maps from files and back, in patient LPS mm."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +9,12 @@ import numpy as np
 from glisson.core import BadInput, LabelMap, Volume
 from glisson.io.decoding import decoding
 from glisson.io.dicom import has_dicom, read_dicom_folder, read_dicom_mask
+from glisson.io.dicom_segmentation import is_dicom_segmentation, read_dicom_segmentation, write_dicom_segmentation
 from glisson.io.ircad import read_mask_folders
 from glisson.io.label_names import canonical_name, canonical_table
 from glisson.io.nifti import read_nifti, write_nifti
 from glisson.io.nrrd_files import read_nrrd, write_nrrd
+from glisson.io.slicer_segmentation import has_segments, read_segmentation, write_segmentation
 from glisson.io.stored_image import StoredImage, as_whole_numbers
 from glisson.io.totalsegmentator import class_names
 
@@ -53,14 +55,30 @@ def write_volume(path: str | Path, volume: Volume) -> None:
 
 
 def read_labels(path: str | Path, scheme: str | None = None, names: Mapping[int, str] | None = None) -> LabelMap:
-    """Read one label map, its names made canonical (see `label_names`).
+    """Read one label map, its names made canonical (see `label_names`); arguments as for `read_label_maps`.
 
-    Names come from `names`, else from the scheme's table, else from the file; a mask with a single label
-    and no name is called after its file ("liver.nii.gz" is "liver").
+    Raises:
+        BadInput: as for `read_label_maps`, or the labels overlap, so that they are several maps.
+    """
+    maps = read_label_maps(path, scheme, names)
+    if len(maps) != 1:
+        raise BadInput(f"{path} holds {len(maps)} label maps that may overlap; give one of them.")
+    return maps[0]
+
+
+def read_label_maps(
+    path: str | Path, scheme: str | None = None, names: Mapping[int, str] | None = None
+) -> tuple[LabelMap, ...]:
+    """Read whatever holds labels, their names made canonical (see `label_names`).
+
+    That is a NIfTI or NRRD file, a segmentation of 3D Slicer (`.seg.nrrd`) or DICOM (a map for each layer of
+    segments that overlap), a folder with one DICOM mask, or a folder of such files or folders. Segmentations state
+    names. Those of other files come from `names`, else from the scheme's table, else from the file; a mask with a
+    single label and no name is called after its file ("liver.nii.gz" is "liver").
 
     Args:
-        path: a NIfTI or NRRD file, or a folder with one DICOM mask.
-        scheme: "totalsegmentator" (117 classes, version 2), "ircad" (a mask folder), or None.
+        path: file or folder.
+        scheme: "totalsegmentator" (117 classes, version 2), "ircad" (mask folders), or None.
         names: names by label number.
 
     Raises:
@@ -69,28 +87,52 @@ def read_labels(path: str | Path, scheme: str | None = None, names: Mapping[int,
     source = Path(path)
     if scheme is not None and scheme not in SCHEMES:
         raise BadInput(f"Unknown label scheme {scheme!r}; use one of {list(SCHEMES)}.")
-    image = read_dicom_mask(source) if source.is_dir() else _stored(source)
-    with decoding(source, "a label map"):
+    if not source.is_dir():
+        return _maps_of_file(source, scheme, names)
+    visible = [file for file in sorted(source.iterdir()) if not file.name.startswith(".")]
+    found = [file for file in visible if file.name.lower().endswith(_IMAGES) or is_dicom_segmentation(file)]
+    if found:
+        return tuple(labels for file in found for labels in _maps_of_file(file, scheme, names))
+    if has_dicom(source):
+        return (_named_labels(source, read_dicom_mask(source), scheme, names),)
+    return read_mask_folders(source)
+
+
+def _maps_of_file(path: Path, scheme: str | None, names: Mapping[int, str] | None) -> tuple[LabelMap, ...]:
+    if is_dicom_segmentation(path):
+        return read_dicom_segmentation(path)
+    if path.name.lower().endswith(_IMAGES[2:]) and has_segments(path):
+        return read_segmentation(path)
+    return (_named_labels(path, _stored(path), scheme, names),)
+
+
+def _named_labels(path: Path, image: StoredImage, scheme: str | None, names: Mapping[int, str] | None) -> LabelMap:
+    with decoding(path, "a label map"):
         voxels = as_whole_numbers(image.voxels)
-        return LabelMap(voxels, image.grid, _label_names(source, image, voxels, scheme, names))
+        return LabelMap(voxels, image.grid, _label_names(path, image, voxels, scheme, names))
 
 
-def read_label_maps(
-    path: str | Path, scheme: str | None = None, names: Mapping[int, str] | None = None
-) -> tuple[LabelMap, ...]:
-    """Read whatever holds labels: one file, one mask folder, or a folder of such files or folders (one map each).
+def write_segments(path: str | Path, maps: Sequence[LabelMap], scan: str | Path | None = None) -> None:
+    """Write label maps that may overlap as one segmentation for other programs: `.seg.nrrd` or DICOM (`.dcm`); atomic.
 
-    Arguments as for `read_labels`.
+    Args:
+        path: the file to make.
+        maps: label maps on one grid.
+        scan: the DICOM folder of the scan, which a DICOM segmentation refers to.
 
     Raises:
-        BadInput: as for `read_labels`.
+        BadInput: the suffix is none of these, the scan is missing or another one, or the place cannot be written.
+        WriteFailed: the disk is full.
     """
-    source = Path(path)
-    if source.is_dir() and not has_dicom(source):
-        visible = [file for file in sorted(source.iterdir()) if not file.name.startswith(".")]
-        files = [file for file in visible if file.name.lower().endswith(_IMAGES)]
-        return tuple(read_labels(file, scheme, names) for file in files) or read_mask_folders(source)
-    return (read_labels(source, scheme, names),)
+    target = Path(path)
+    if target.name.lower().endswith(".seg.nrrd"):
+        write_segmentation(target, maps)
+    elif target.name.lower().endswith(".dcm"):
+        if scan is None:
+            raise BadInput(f"{path}: a DICOM segmentation refers to the images of its scan; give their DICOM folder.")
+        write_dicom_segmentation(target, maps, Path(scan))
+    else:
+        raise BadInput(f"{path}: segmentations are written as .seg.nrrd or .dcm.")
 
 
 def write_labels(path: str | Path, labels: LabelMap) -> None:

@@ -70,9 +70,10 @@ def require_same_grid(reference: Volume | LabelMap | Grid, other: Volume | Label
 
 
 def on_grid_of(reference: Volume | Grid, labels: LabelMap, what: str) -> LabelMap:
-    """The same labels with their axes in the order and sense of the reference's; nothing is interpolated.
+    """The same labels on the reference's grid: axes in its order and sense, and cropped parts filled up.
 
-    Other tools often store a scan's labels with axes flipped, though each voxel lies on one of the scan's.
+    Other tools often store a scan's labels with axes flipped, or only the box that holds some, though each voxel
+    lies on one of the scan's. Nothing is interpolated.
 
     Args:
         reference: the scan, usually.
@@ -80,7 +81,7 @@ def on_grid_of(reference: Volume | Grid, labels: LabelMap, what: str) -> LabelMa
         what: its name for the sentence ("the label map liver.nii.gz").
 
     Raises:
-        BadInput: the voxels do not coincide; both grids are described.
+        BadInput: the voxels do not coincide, or labelled ones lie outside; both grids are described.
     """
     wanted = reference if isinstance(reference, Grid) else reference.grid
     turn = wanted.direction.T @ labels.grid.direction
@@ -98,8 +99,32 @@ def on_grid_of(reference: Volume | Grid, labels: LabelMap, what: str) -> LabelMa
         labels.grid.points_from_indices(first),
         labels.grid.direction[:, order] * signs,
     )
-    require_same_grid(wanted, grid, what)
-    return LabelMap(np.ascontiguousarray(np.flip(voxels, tuple(flipped))), wanted, labels.names)
+    placed = _filled_up(wanted, grid, np.flip(voxels, tuple(flipped)))
+    if placed is None:
+        require_same_grid(wanted, labels, what)
+        placed = voxels
+    return LabelMap(placed, wanted, labels.names)
+
+
+def _filled_up(wanted: Grid, grid: Grid, voxels: NDArray[Any]) -> NDArray[Any] | None:
+    """Voxels of a part of a grid on the whole; None where they do not coincide or labels lie outside.
+
+    What has the whole's shape is no part of it: shifted by a voxel, it more likely has a wrong origin.
+    """
+    if wanted.shape == grid.shape:
+        return np.ascontiguousarray(voxels) if wanted.matches(grid) else None
+    start = np.rint(wanted.indices_from_points(grid.origin_mm[None])[0]).astype(int)
+    part = Grid(grid.shape, wanted.spacing_mm, wanted.points_from_indices(start[None])[0], wanted.direction)
+    if not part.matches(grid):
+        return None
+    low = np.maximum(-start, 0)
+    high = np.minimum(np.array(wanted.shape) - start, grid.shape)
+    inside = tuple(slice(a, max(a, b)) for a, b in zip(low.tolist(), high.tolist(), strict=True))
+    if np.count_nonzero(voxels[inside]) < np.count_nonzero(voxels):
+        return None
+    whole = np.zeros(wanted.shape, dtype=voxels.dtype)
+    whole[tuple(slice(a + s.start, a + s.stop) for a, s in zip(start.tolist(), inside, strict=True))] = voxels[inside]
+    return whole
 
 
 def _stacked(masks: dict[str, NDArray[np.bool_]], grid: Grid) -> LabelMap:

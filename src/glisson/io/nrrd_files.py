@@ -7,7 +7,7 @@ writes; only the voxels are unpacked here, because they must not grow beyond wha
 import bz2
 import gzip
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -50,18 +50,31 @@ def read_nrrd(path: Path) -> StoredImage:
     Raises:
         BadInput: absent, damaged, too large, not 3-D, sheared, or without a patient coordinate system.
     """
+    header, layers, grid = read_layers(path)
+    if len(layers) != 1:
+        raise BadInput(f"{path}: it has {len(layers)} layers; Glisson reads one 3-D image, so split it.")
+    with decoding(path, "an NRRD image"):
+        names = {int(k): str(v) for k, v in json.loads(header.get("label_names", "{}")).items()}
+        return StoredImage(layers[0], grid, names, header.get("modality"))
+
+
+def read_layers(path: Path) -> tuple[Mapping[str, Any], list[NDArray[Any]], Grid]:
+    """Header, layers and geometry of an NRRD image; where it has four axes the first one counts layers [i, j, k].
+
+    Raises:
+        BadInput: as for `read_nrrd`, whatever the number of layers.
+    """
     with decoding(path, "an NRRD image"), path.open("rb") as file:
         header = nrrd.read_header(file)
         sizes = [int(n) for n in header["sizes"]]
-        if int(header["dimension"]) != 3 or len(sizes) != 3:
+        if len(sizes) not in (3, 4) or int(header["dimension"]) != len(sizes):
             raise BadInput(f"it has {len(sizes)} dimensions; Glisson reads one 3-D image, so split it.")
         dtype = _dtype(header)
         check_image_size(sizes, dtype.itemsize)
         grid = _grid(header, sizes)
         voxels = _voxels(path, file, header, dtype).reshape(sizes, order="F")
-        names = {int(k): str(v) for k, v in json.loads(header.get("label_names", "{}")).items()}
-        native = in_c_order(voxels.astype(dtype.newbyteorder("=")))
-        return StoredImage(native, grid, names, header.get("modality"))
+        layers = [voxels] if len(sizes) == 3 else [voxels[n] for n in range(sizes[0])]
+        return header, [in_c_order(layer.astype(dtype.newbyteorder("="))) for layer in layers], grid
 
 
 def write_nrrd(
@@ -73,22 +86,41 @@ def write_nrrd(
         BadInput: the place cannot be written.
         WriteFailed: the disk is full.
     """
-    header: dict[str, Any] = {
-        "space": "left-posterior-superior",
-        "space directions": (grid.direction * grid.spacing_mm).T,
-        "space origin": grid.origin_mm,
-        "space units": ["mm", "mm", "mm"],
-        "kinds": ["domain", "domain", "domain"],
-        "encoding": "gzip",
-    }
-    if modality:
-        header["modality"] = modality
+    said: dict[str, Any] = {"modality": modality} if modality else {}
     if names is not None:
-        header["label_names"] = json.dumps({str(number): name for number, name in names.items()})
+        said["label_names"] = json.dumps({str(number): name for number, name in names.items()})
     # The format knows neither truth values nor half precision.
     known = {"b": np.uint8, "f": np.float32}.get(voxels.dtype.kind) if voxels.dtype.itemsize <= 2 else None
-    stored = voxels.astype(known) if known else voxels
+    write_layers(path, [voxels.astype(known) if known else voxels], grid, said)
+
+
+def write_layers(path: Path, layers: Sequence[NDArray[Any]], grid: Grid, said: Mapping[str, Any]) -> None:
+    """Write layers [i, j, k] of one type, several of them along a first axis of their own; atomic, geometry exact.
+
+    Args:
+        path: the file to make.
+        layers: voxels on the grid.
+        grid: where they lie.
+        said: further fields of the header.
+
+    Raises:
+        BadInput: the place cannot be written.
+        WriteFailed: the disk is full.
+    """
+    directions, kinds = (grid.direction * grid.spacing_mm).T, ["domain"] * 3
+    if len(layers) > 1:
+        directions, kinds = np.vstack([np.full((1, 3), np.nan), directions]), ["list", *kinds]
+    header = {
+        "space": "left-posterior-superior",
+        "space directions": directions,
+        "space origin": grid.origin_mm,
+        "space units": ["mm", "mm", "mm"],
+        "kinds": kinds,
+        "encoding": "gzip",
+        **said,
+    }
     with atomic_path(path) as temporary:
+        stored = layers[0] if len(layers) == 1 else np.stack(layers)
         nrrd.write(str(temporary), stored, header, compression_level=6)
 
 
@@ -115,7 +147,12 @@ def _grid(header: Mapping[str, Any], sizes: list[int]) -> Grid:
     if len(set(units)) != 1 or units[0] not in _MM_PER_UNIT:
         raise BadInput(f"its units of length are {units}; Glisson reads mm, cm, m and um.")
     scale = _MM_PER_UNIT[units[0]] * np.array(signs, dtype=np.float64)
-    columns = np.asarray(header["space directions"], dtype=np.float64).T * scale[:, None]
+    rows = np.asarray(header["space directions"], dtype=np.float64)
+    if rows.shape == (4, 3) and np.isnan(rows[0]).all():  # layers have no direction in space
+        rows, sizes = rows[1:], sizes[1:]
+    if len(sizes) != 3:
+        raise BadInput(f"it has {len(sizes)} dimensions; Glisson reads one 3-D image, so split it.")
+    columns = rows.T * scale[:, None]
     origin = np.asarray(header["space origin"], dtype=np.float64) * scale
     if columns.shape != (3, 3) or not np.isfinite(columns).all():
         raise BadInput("its space directions are not three finite vectors.")

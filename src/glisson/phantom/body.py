@@ -16,15 +16,13 @@ from glisson.phantom.proportions import Proportions
 BODY_BOX = np.array([[-172.0, -112.0, -98.0], [172.0, 104.0, 108.0]])
 """Lowest and highest corner (2, 3) of what the CT shows, mm."""
 
-AIR_HU = -1000.0
 
-
-def body_solids(proportions: Proportions, shape: LiverShape) -> list[tuple[Solid, float]]:
-    """Solids with their HU in painting order."""
+def body_solids(proportions: Proportions, shape: LiverShape) -> list[tuple[Solid, str]]:
+    """Solids with the names of their tissues in painting order."""
     return _wall_solids(shape) + _neighbours(proportions) + _dorsal_organs()
 
 
-def _wall_solids(shape: LiverShape) -> list[tuple[Solid, float]]:
+def _wall_solids(shape: LiverShape) -> list[tuple[Solid, str]]:
     """Skin and fat, muscle, the fat inside, ribs, lungs above a diaphragm that lies on the liver."""
     skin = _column(166.0, 106.0)
     muscle = _column(154.0, 95.0)
@@ -40,10 +38,17 @@ def _wall_solids(shape: LiverShape) -> list[tuple[Solid, float]]:
     dome = union([dome, grown(shape.liver, 3.0)], blend=8.0)
     lungs = intersection(difference(_column(145.0, 85.0), dome), half_space(2, 5.0, keep_below=False))
     diaphragm = intersection(grown(lungs, 3.0), inside)
-    return [(skin, -95.0), (muscle, 58.0), (inside, -90.0), (diaphragm, 55.0), (lungs, -830.0), *_ribs()]
+    return [
+        (skin, "skin fat"),
+        (muscle, "muscle"),
+        (inside, "fat"),
+        (diaphragm, "diaphragm"),
+        (lungs, "lung"),
+        *_ribs(),
+    ]
 
 
-def _neighbours(proportions: Proportions) -> list[tuple[Solid, float]]:
+def _neighbours(proportions: Proportions) -> list[tuple[Solid, str]]:
     """Heart, stomach, colon and duodenum: they touch the liver, and heart and stomach wall look like it."""
     place = proportions.place
     heart = ellipsoid(place([30.0, -32.0, 86.0]), [48.0, 38.0, 34.0])
@@ -57,17 +62,17 @@ def _neighbours(proportions: Proportions) -> list[tuple[Solid, float]]:
     gas = ellipsoid(place([-20.0, -60.0, -88.0]), [34.0, 7.0, 10.0])
     duodenum = cone(place([2.0, 2.0, -34.0]), place([-42.0, 13.0, -90.0]), 12.0, 13.0)
     return [
-        (heart, 118.0),
-        (stomach, 88.0),
-        (grown(stomach, -4.0), 28.0),
-        (ellipsoid(place([84.0, -46.0, -4.0]), [22.0, 7.0, 24.0]), -820.0),
-        (colon, 45.0),
-        (gas, -850.0),
-        (duodenum, 62.0),
+        (heart, "heart"),
+        (stomach, "stomach wall"),
+        (grown(stomach, -4.0), "stomach"),
+        (ellipsoid(place([84.0, -46.0, -4.0]), [22.0, 7.0, 24.0]), "stomach gas"),
+        (colon, "colon"),
+        (gas, "gas"),
+        (duodenum, "duodenum"),
     ]
 
 
-def _dorsal_organs() -> list[tuple[Solid, float]]:
+def _dorsal_organs() -> list[tuple[Solid, str]]:
     """Spleen, kidneys, aorta, spine and the muscles beside it, all behind the board's plane or lateral."""
     spleen = ellipsoid([110.0, 34.0, 34.0], [26.0, 38.0, 46.0])
     right_kidney = ellipsoid([-62.0, 36.0, -58.0], [28.0, 25.0, 50.0])
@@ -82,24 +87,24 @@ def _dorsal_organs() -> list[tuple[Solid, float]]:
     aorta = cone([16.0, 20.0, -130.0], [14.0, 22.0, 140.0], 11.0, 12.0)
     crura = union([cone([x, 22.0, -60.0], [0.5 * x, 14.0, 70.0], 7.0, 7.0) for x in (-18.0, 24.0)])
     return [
-        (back_muscle, 58.0),
-        (psoas, 60.0),
-        (crura, 58.0),
-        (discs, 90.0),
-        (bone, 420.0),
-        (grown(bone, -2.5), 190.0),
-        (arches, 420.0),
-        (canal, 25.0),
-        (aorta, 185.0),
-        (spleen, 122.0),
-        (right_kidney, 195.0),
-        (ellipsoid([-58.0, 36.0, -58.0], [11.0, 10.0, 26.0]), 20.0),
-        (left_kidney, 195.0),
-        (ellipsoid([62.0, 40.0, -40.0], [11.0, 10.0, 26.0]), 20.0),
+        (back_muscle, "back muscle"),
+        (psoas, "psoas"),
+        (crura, "crura"),
+        (discs, "disc"),
+        (bone, "bone"),
+        (grown(bone, -2.5), "marrow"),
+        (arches, "arch"),
+        (canal, "canal"),
+        (aorta, "aorta"),
+        (spleen, "spleen"),
+        (right_kidney, "kidney"),
+        (ellipsoid([-58.0, 36.0, -58.0], [11.0, 10.0, 26.0]), "renal pelvis"),
+        (left_kidney, "kidney"),
+        (ellipsoid([62.0, 40.0, -40.0], [11.0, 10.0, 26.0]), "renal pelvis"),
     ]
 
 
-def _ribs() -> list[tuple[Solid, float]]:
+def _ribs() -> list[tuple[Solid, str]]:
     """Ribs in the muscle of the wall, dense outside and spongy inside.
 
     They are elliptic rings every 26 mm that sink towards the front by 35 degrees, 5 mm thick, 12 mm tall.
@@ -118,7 +123,7 @@ def _ribs() -> list[tuple[Solid, float]]:
     low = [-half_width - 4.0, -half_depth - 4.0, -1e3]
     ribs = Solid(distance, np.array([low, [half_width + 4.0, 84.0, 1e3]]))
     ribs = intersection(ribs, half_space(1, 84.0, keep_below=True))
-    return [(ribs, 480.0), (grown(ribs, -1.6), 240.0)]
+    return [(ribs, "rib"), (grown(ribs, -1.6), "rib marrow")]
 
 
 def _column(half_width: float, half_depth: float) -> Solid:

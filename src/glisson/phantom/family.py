@@ -10,6 +10,7 @@ from glisson.core.errors import BadInput
 from glisson.core.image import Grid
 from glisson.core.mesh import TriangleSurface
 from glisson.core.structures import Curve, Structures, Tumour, VesselTree
+from glisson.phantom.appearance import PORTAL_PHASE, Appearance
 from glisson.phantom.body import BODY_BOX
 from glisson.phantom.interior import Interior, build_interior
 from glisson.phantom.lever_lift import lever_lift
@@ -22,16 +23,21 @@ from glisson.phantom.scan import Anatomy, make_scan
 DEFAULT_SPACING_MM = (1.5, 1.5, 2.0)
 
 
-def make_phantom(seed: int, spacing_mm: Sequence[float] = DEFAULT_SPACING_MM, grid: Grid | None = None) -> Phantom:
+def make_phantom(
+    seed: int,
+    spacing_mm: Sequence[float] = DEFAULT_SPACING_MM,
+    grid: Grid | None = None,
+    appearance: Appearance = PORTAL_PHASE,
+) -> Phantom:
     """Member `seed` (≥ 0) of the family, without a deformed truth.
 
     Its procedural shape is taken as the scanned (loaded) shape A. `grid` may be any grid in LPS and
-    overrules `spacing_mm`, which asks for one that shows the upper abdomen.
+    overrules `spacing_mm`, which asks for one that shows the upper abdomen. `appearance` says how tissues look.
 
     Raises:
         BadInput: the seed is negative or the spacing is not three lengths of 0.3 to 10 mm.
     """
-    return assemble(build_anatomy(seed), seed, scan_grid(spacing_mm) if grid is None else grid)
+    return assemble(build_anatomy(seed), seed, scan_grid(spacing_mm) if grid is None else grid, appearance=appearance)
 
 
 def build_anatomy(seed: int, loading: Loading | None = None) -> Anatomy:
@@ -43,9 +49,15 @@ def build_anatomy(seed: int, loading: Loading | None = None) -> Anatomy:
     return Anatomy(proportions, shape, build_interior(proportions, shape, seed), loading)
 
 
-def assemble(anatomy: Anatomy, seed: int, grid: Grid, truth: Deformation | None = None) -> Phantom:
+def assemble(
+    anatomy: Anatomy,
+    seed: int,
+    grid: Grid,
+    truth: Deformation | None = None,
+    appearance: Appearance = PORTAL_PHASE,
+) -> Phantom:
     """Render an anatomy and put everything known about it together."""
-    scan = make_scan(anatomy, grid, seed)
+    scan = make_scan(anatomy, grid, seed, appearance)
     return Phantom(
         seed=seed,
         volume=scan.volume,

@@ -7,18 +7,20 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from glisson.core.image import Grid, LabelMap, Volume
-from glisson.phantom.body import AIR_HU, body_solids
+from glisson.phantom.appearance import PORTAL_PHASE, Appearance
+from glisson.phantom.body import body_solids
 from glisson.phantom.canvas import Box, Canvas, sub_grid, voxel_places
 from glisson.phantom.couinaud import SEGMENT_NAMES
+from glisson.phantom.disturbances import rician, sensitivity, streaks
+from glisson.phantom.implicit import ellipsoid
 from glisson.phantom.interior import DUCT_RADIUS_MM, WIRE_RADIUS_MM, Interior
 from glisson.phantom.liver_shape import LiverShape
 from glisson.phantom.loading import Loading
 from glisson.phantom.noise import ct_noise
 from glisson.phantom.proportions import Proportions
+from glisson.phantom.vessels import scattered_targets
 
-LIVER_HU, TUMOUR_HU, PORTAL_HU, HEPATIC_HU, CAVA_HU = 110.0, 70.0, 172.0, 165.0, 145.0
-DUCT_HU, GALLBLADDER_HU, WIRE_HU = 10.0, 10.0, 2600.0
-NOISE_HU = 11.0
+_CLIP_RADII_MM = (3.0, 1.2, 1.2)
 
 _NAMES = {1: "portal", 2: "hepatic", 3: "duct", 4: "wire", 5: "gallbladder", 6: "ivc"}
 
@@ -44,29 +46,35 @@ class Anatomy:
     loading: Loading | None = None
 
 
-def make_scan(anatomy: Anatomy, grid: Grid, seed: int) -> Scan:
-    """Render the CT (int16 HU, portal-venous phase) and the truth's labels on `grid`."""
-    hu = np.full(grid.shape, AIR_HU, dtype=np.float32)
+def make_scan(anatomy: Anatomy, grid: Grid, seed: int, appearance: Appearance = PORTAL_PHASE) -> Scan:
+    """Render the scan (int16 HU or MR signal) and the truth's labels on `grid`."""
+    values = appearance.values
+    hu = np.full(grid.shape, values["air"], dtype=np.float32)
+    gas = np.zeros(grid.shape, dtype=bool)
     places = voxel_places(grid)
     body = Canvas(grid, hu, places, 0.0)
-    for solid, value in body_solids(anatomy.proportions, anatomy.shape):
-        body.paint(solid, value)
+    for solid, tissue in body_solids(anatomy.proportions, anatomy.shape):
+        inside = body.paint(solid, values[tissue])
+        if tissue in ("gas", "stomach gas"):
+            gas |= inside
     structures = np.zeros(grid.shape, dtype=np.uint8)
-    structures[body.paint(anatomy.shape.cava, CAVA_HU)] = 6
-    structures[body.paint(anatomy.shape.portal_trunk, PORTAL_HU)] = 1
+    structures[body.paint(anatomy.shape.cava, values["cava"])] = 6
+    structures[body.paint(anatomy.shape.portal_trunk, values["portal"])] = 1
     canvas, box = _organ_canvas(anatomy, body)
-    gallbladder = canvas.paint(anatomy.shape.gallbladder, GALLBLADDER_HU)
+    gallbladder = canvas.paint(anatomy.shape.gallbladder, values["gallbladder"])
     structures[box][gallbladder] = 5
-    liver = canvas.paint(anatomy.shape.liver, LIVER_HU)
+    liver = canvas.paint(anatomy.shape.liver, values["liver"])
     structures[box][liver] = 0
-    _paint_texture(canvas, liver, seed)
-    tumours = _paint_interior(anatomy.interior, canvas, structures[box])
+    _paint_texture(canvas, liver, appearance.texture, seed)
+    tumours = _paint_interior(anatomy.interior, canvas, structures[box], appearance)
+    metal = np.zeros(grid.shape, dtype=bool)
+    metal[box] = _paint_clips(canvas, anatomy.shape, appearance, seed) | (structures[box] == 4)
     segments = np.zeros(grid.shape, dtype=np.uint8)
     segments[box][liver] = anatomy.interior.planes.segments(canvas.places[liver])
-    hu += ct_noise(grid, NOISE_HU, seed)
+    voxels = _disturbed(hu, metal, gas & (structures == 0) & (segments == 0), grid, appearance, seed)
     names = {n: tumour.name for n, tumour in enumerate(anatomy.interior.tumours, start=1)}
     return Scan(
-        volume=Volume(np.clip(np.rint(hu), -1024, 3071).astype(np.int16), grid),
+        volume=Volume(voxels, grid, appearance.modality),
         organ=LabelMap(_whole(grid, box, liver), grid, {1: "liver"}),
         tumours=LabelMap(_whole(grid, box, tumours), grid, names),
         structures=LabelMap(structures, grid, _NAMES),
@@ -87,25 +95,56 @@ def _organ_canvas(anatomy: Anatomy, body: Canvas) -> tuple[Canvas, Box]:
     return Canvas(sub_grid(body.grid, box), body.hu[box], places, reach), box
 
 
-def _paint_texture(canvas: Canvas, liver: NDArray[np.bool_], seed: int) -> None:
+def _paint_texture(canvas: Canvas, liver: NDArray[np.bool_], deviation: float, seed: int) -> None:
     """Uneven enhancement of the parenchyma: a few HU, over some 15 mm."""
     random = np.random.default_rng([seed, 3])
     texture = gaussian_filter(random.standard_normal(liver.shape, dtype=np.float32), 6.0 / canvas.grid.spacing_mm)
-    canvas.hu[liver] += 2.5 * texture[liver] / float(texture.std())
+    canvas.hu[liver] += deviation * texture[liver] / float(texture.std())
 
 
-def _paint_interior(interior: Interior, canvas: Canvas, structures: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def _paint_interior(
+    interior: Interior, canvas: Canvas, structures: NDArray[np.uint8], appearance: Appearance
+) -> NDArray[np.uint8]:
     """Vessels, tumours, duct and wire; fills in `structures` and returns the tumours' labels."""
-    structures[canvas.paint_tree(interior.hepatic, HEPATIC_HU)] = 2
-    structures[canvas.paint_tree(interior.portal, PORTAL_HU)] = 1
+    values = appearance.values
+    structures[canvas.paint_tree(interior.hepatic, values["hepatic"])] = 2
+    structures[canvas.paint_tree(interior.portal, values["portal"])] = 1
     tumours = np.zeros(structures.shape, dtype=np.uint8)
     for number, tumour in enumerate(interior.tumours, start=1):
-        tumours[canvas.paint(tumour.solid, TUMOUR_HU)] = number
+        tumours[canvas.paint(tumour.solid, values["tumour"])] = number
     duct = interior.duct.points_mm
-    structures[canvas.paint_tube(duct, DUCT_RADIUS_MM, DUCT_HU)] = 3
+    structures[canvas.paint_tube(duct, DUCT_RADIUS_MM, values["duct"])] = 3
     wire = duct[interior.duct.arc_lengths_mm <= interior.wire_length_mm]
-    structures[canvas.paint_tube(wire, WIRE_RADIUS_MM, WIRE_HU)] = 4
+    structures[canvas.paint_tube(wire, WIRE_RADIUS_MM, values["wire"])] = 4
     return tumours
+
+
+def _paint_clips(canvas: Canvas, shape: LiverShape, appearance: Appearance, seed: int) -> NDArray[np.bool_]:
+    """Metal clips at places inside the liver; their mask on the canvas."""
+    mask = np.zeros(canvas.grid.shape, dtype=bool)
+    if appearance.clips:
+        random = np.random.default_rng([seed, 6])
+        for place in scattered_targets(shape.liver, 5.0, 200, random)[: appearance.clips]:
+            mask |= canvas.paint(ellipsoid(place, np.array(_CLIP_RADII_MM)), appearance.values["metal"])
+    return mask
+
+
+def _disturbed(
+    clean: NDArray[np.float32],
+    metal: NDArray[np.bool_],
+    gas: NDArray[np.bool_],
+    grid: Grid,
+    appearance: Appearance,
+    seed: int,
+) -> NDArray[np.int16]:
+    """The picture as the scanner stores it, with noise and artefacts."""
+    if appearance.modality == "MR":
+        seen, low, high = rician(clean * sensitivity(grid, appearance.bias, seed), appearance.noise, seed), 0, 32767
+    else:
+        seen, low, high = clean + ct_noise(grid, appearance.noise, seed), -1024, 3071
+        seen += streaks(metal, gas, grid, appearance.metal_streaks, appearance.gas_streaks, seed)
+    stored: NDArray[np.int16] = np.clip(np.rint(seen), low, high).astype(np.int16)
+    return stored
 
 
 def _whole(grid: Grid, box: Box, part: NDArray[np.bool_] | NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -14,9 +14,9 @@ from glisson.core.model import Material, Model
 from glisson.core.scenario import ContactLaw, Scenario
 from glisson.core.structures import Tumour
 from glisson.geometry.mapping import PointMap
-from glisson.preoperative.attachments import DEFAULT_ATTACHMENTS, node_sets
-from glisson.preoperative.model_building import ModelSettings
-from glisson.preoperative.regions import ORGAN
+from glisson.preoperative.model.attachments import DEFAULT_ATTACHMENTS, node_sets
+from glisson.preoperative.model.model_building import ModelSettings
+from glisson.preoperative.model.regions import ORGAN
 from glisson.studies.point import Outcome
 
 LIFT_PACKAGES = ("glisson.core", "glisson.geometry", "glisson.mechanics", "glisson.phantom", "glisson.preoperative")

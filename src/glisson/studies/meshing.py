@@ -6,7 +6,7 @@ from glisson.core.mesh import TetMesh, TriangleSurface
 from glisson.phantom.liver_shape import build_shape
 from glisson.phantom.proportions import Proportions
 from glisson.phantom.solid_surface import solid_surface
-from glisson.preoperative.mmg import Mmg, MmgParameters
+from glisson.preoperative.meshing.mmg import Mmg, MmgParameters
 
 _ENVELOPE = 1.0 / 16.0
 """How far the surface may stray, in edge lengths: as the mesher's own default for a fine mesh, about."""

@@ -24,9 +24,9 @@ from glisson.phantom.heterogeneity import Contains, stiffness_levels, uneven_mod
 from glisson.phantom.lever_lift import lever_lift
 from glisson.phantom.lift_truths import lift_truth
 from glisson.phantom.proportions import draw_proportions
-from glisson.preoperative.attachments import DirectionAttachment, node_sets
-from glisson.preoperative.regions import ORGAN, element_regions
-from glisson.preoperative.surface import MarchingCubes, MarchingCubesParameters
+from glisson.preoperative.meshing.surface import MarchingCubes, MarchingCubesParameters
+from glisson.preoperative.model.attachments import DirectionAttachment, node_sets
+from glisson.preoperative.model.regions import ORGAN, element_regions
 from glisson.studies.lifts import (
     LIFT_PACKAGES,
     carried_centroid,

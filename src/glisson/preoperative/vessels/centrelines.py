@@ -81,7 +81,7 @@ def longest_path(tree: Tree) -> IntArray:
 
 
 def _skeleton_points(mask: NDArray[np.bool_], grid: Grid) -> tuple[FloatArray, FloatArray]:
-    """LPS mm (n, 3) and radii (n,) of the skeleton's voxels."""
+    """LPS mm (n, 3) and radii (n,) of the voxels of a mask's skeleton."""
     box = ndimage.find_objects(mask.astype(np.uint8))
     if not box:
         return np.zeros((0, 3)), np.zeros(0)

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from glisson.preoperative.intensity_prior import IntensityPrior
-from glisson.preoperative.propagation import SliceContour
-from glisson.preoperative.working_grid import WorkingGrid
+from glisson.preoperative.imaging.working_grid import WorkingGrid
+from glisson.preoperative.liver.intensity_prior import IntensityPrior
+from glisson.preoperative.liver.propagation import SliceContour
 
 _JUMP = 0.25
 """Change of area against the mean of both neighbours, as a fraction …"""

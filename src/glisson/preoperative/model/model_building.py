@@ -14,12 +14,12 @@ from glisson.core.mesh import TetMesh
 from glisson.core.model import Capsule, Material, Model, Rod
 from glisson.core.protocols import Mesher, Progress, SurfaceExtractor, silent
 from glisson.core.status import Status
-from glisson.preoperative.attachments import DEFAULT_ATTACHMENTS, Attachment, ligaments, node_sets
-from glisson.preoperative.borders import touched_borders
-from glisson.preoperative.components import single_part
-from glisson.preoperative.mesh_quality import MeshQuality, mesh_quality
-from glisson.preoperative.regions import ORGAN, element_regions
-from glisson.preoperative.structures import build_structures
+from glisson.preoperative.imaging.borders import touched_borders
+from glisson.preoperative.imaging.components import single_part
+from glisson.preoperative.meshing.mesh_quality import MeshQuality, mesh_quality
+from glisson.preoperative.model.attachments import DEFAULT_ATTACHMENTS, Attachment, ligaments, node_sets
+from glisson.preoperative.model.regions import ORGAN, element_regions
+from glisson.preoperative.model.structures import build_structures
 
 LARGEST_VOLUME_ERROR = 0.01
 """A mesh whose volume differs by more than this fraction from the organ's mask is refused."""

@@ -12,7 +12,7 @@ from scipy import ndimage
 from skimage.segmentation import watershed
 
 from glisson.core.arrays import FloatArray, IntArray
-from glisson.preoperative.intensity_prior import SOFT_TISSUE_HU, IntensityPrior
+from glisson.preoperative.liver.intensity_prior import SOFT_TISSUE_HU, IntensityPrior
 
 _NARROWEST_PASSAGE = 0.3
 """Basins of equal grey value are joined when the passage is this fraction as wide as the smaller basin …"""

@@ -23,8 +23,8 @@ from glisson.core.parameters import parameter
 from glisson.core.protocols import Progress, silent
 from glisson.core.status import Status
 from glisson.geometry.distance import SurfaceTree
-from glisson.preoperative.lattice import body_centred_lattice, inside_of_level
-from glisson.preoperative.mesh_quality import face_connected_parts
+from glisson.preoperative.meshing.lattice import body_centred_lattice, inside_of_level
+from glisson.preoperative.meshing.mesh_quality import face_connected_parts
 
 LARGEST_VOLUME_ERROR = 0.01
 """A mesh whose volume differs by more than this fraction from its surface's is refused."""
@@ -129,7 +129,7 @@ class Mmg:
     def _wait(self, source: Path, target: Path, progress: Progress) -> None:
         """Run the child to its end; it is killed when this process is interrupted."""
         log_path = target.with_name("log.txt")
-        command = [sys.executable, "-m", "glisson.preoperative.mmg_process", str(source), str(target)]
+        command = [sys.executable, "-m", "glisson.preoperative.meshing.mmg_process", str(source), str(target)]
         start = time.monotonic()
         with (
             log_path.open("wb") as log,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from glisson.core.arrays import FloatArray
-from glisson.preoperative.intensity_prior import IntensityPrior
+from glisson.preoperative.liver.intensity_prior import IntensityPrior
 
 _DARKEST = 80.0
 """A tumour is at most so much darker than the liver (HU), and never below the next number (fluid)."""

@@ -12,9 +12,9 @@ from glisson.core.errors import BadInput
 from glisson.core.image import Grid, LabelMap, Volume
 from glisson.core.parameters import parameter
 from glisson.core.protocols import Progress, Segmentation, silent
-from glisson.preoperative.axial import slice_axis
-from glisson.preoperative.borders import touched_borders
-from glisson.preoperative.components import Part, single_part
+from glisson.preoperative.imaging.axial import slice_axis
+from glisson.preoperative.imaging.borders import touched_borders
+from glisson.preoperative.imaging.components import Part, single_part
 
 LARGEST_PINHOLE_ML = 1.0
 """Larger cavities are filled too, but a person should look at them."""

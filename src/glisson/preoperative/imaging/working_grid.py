@@ -8,7 +8,7 @@ from scipy import ndimage
 
 from glisson.core.arrays import FloatArray
 from glisson.core.image import Grid
-from glisson.preoperative.axial import slice_axis
+from glisson.preoperative.imaging.axial import slice_axis
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,8 +13,8 @@ from scipy import ndimage
 
 from glisson.core.arrays import FloatArray
 from glisson.core.protocols import Progress
-from glisson.preoperative.localized_contour import ContourResult, LocalizedContourParameters, evolve
-from glisson.preoperative.signed_distance import signed_distance_of_mask
+from glisson.preoperative.contours.localized_contour import ContourResult, LocalizedContourParameters, evolve
+from glisson.preoperative.contours.signed_distance import signed_distance_of_mask
 
 _FREEDOM_MM = 2.0
 """How far a contour may get from where the reachable region ends; a pixel where these are larger."""

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from glisson.core.arrays import FloatArray
 from glisson.core.errors import BadInput
-from glisson.preoperative.shape_blending import Correction, blended_slice, neighbours
+from glisson.preoperative.correction.shape_blending import Correction, blended_slice, neighbours
 
 _FIRST = 20
 """One slice of so many is spread over the organ before others are chosen by what these showed …"""

@@ -16,8 +16,8 @@ from scipy.spatial import cKDTree
 from glisson.core.arrays import FloatArray
 from glisson.core.errors import BadInput
 from glisson.core.parameters import parameter
-from glisson.preoperative.outline_spline import spread_evenly
-from glisson.preoperative.snake_energy import SnakeEnergy
+from glisson.preoperative.contours.outline_spline import spread_evenly
+from glisson.preoperative.contours.snake_energy import SnakeEnergy
 
 _UNEVEN = 1.5
 _FINE = 0.2

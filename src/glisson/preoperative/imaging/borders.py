@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glisson.core.image import Grid
-from glisson.preoperative.axial import slice_axis
+from glisson.preoperative.imaging.axial import slice_axis
 
 
 @dataclass(frozen=True)

@@ -18,16 +18,16 @@ from glisson.core.image import Grid, LabelMap, Volume
 from glisson.core.parameters import parameter
 from glisson.core.protocols import Progress, Segmentation, silent
 from glisson.core.status import Status
-from glisson.preoperative.axial import slice_axis
-from glisson.preoperative.borders import touched_borders
-from glisson.preoperative.completion import surface_tumours, without_gaps
-from glisson.preoperative.diffusion import diffused
-from glisson.preoperative.intensity_prior import IntensityPrior, estimate_prior
-from glisson.preoperative.localized_contour import LocalizedContourParameters
-from glisson.preoperative.propagation import propagate
-from glisson.preoperative.reachable import opened, reachable_region
-from glisson.preoperative.slice_flags import flag_slices
-from glisson.preoperative.working_grid import WorkingGrid
+from glisson.preoperative.contours.localized_contour import LocalizedContourParameters
+from glisson.preoperative.imaging.axial import slice_axis
+from glisson.preoperative.imaging.borders import touched_borders
+from glisson.preoperative.imaging.diffusion import diffused
+from glisson.preoperative.imaging.working_grid import WorkingGrid
+from glisson.preoperative.liver.completion import surface_tumours, without_gaps
+from glisson.preoperative.liver.intensity_prior import IntensityPrior, estimate_prior
+from glisson.preoperative.liver.propagation import propagate
+from glisson.preoperative.liver.reachable import opened, reachable_region
+from glisson.preoperative.liver.slice_flags import flag_slices
 
 _VISIBLE_HU = (-300.0, 400.0)
 """Air and bone are cut to this range before smoothing."""

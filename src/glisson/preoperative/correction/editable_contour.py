@@ -10,7 +10,7 @@ from skimage.measure import find_contours
 
 from glisson.core.arrays import FloatArray
 from glisson.core.errors import BadInput
-from glisson.preoperative.outline_spline import spread_evenly
+from glisson.preoperative.contours.outline_spline import spread_evenly
 
 _FEWEST = 4
 _GROWTH = 1.25

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.errors import BadInput
 from glisson.core.parameters import parameter
-from glisson.preoperative.signed_distance import reinitialised, signed_distance_of_mask
+from glisson.preoperative.contours.signed_distance import reinitialised, signed_distance_of_mask
 
 _HALF_WIDTH = 1.5
 """ε in voxels: the width of the smoothed Heaviside to either side."""

@@ -10,7 +10,7 @@ from glisson.core.mesh import TetMesh
 from glisson.core.model import Model
 from glisson.core.scenario import ContactLaw, LeverDrive, Scenario, Stage
 from glisson.core.tools import Board
-from glisson.preoperative.lever_placement import DOWN, LeverLiftParameters, place_lever
+from glisson.preoperative.scenario.lever_placement import DOWN, LeverLiftParameters, place_lever
 
 
 def propose_scenario(model: Model, parameters: LeverLiftParameters | None = None) -> Scenario:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glisson.core.arrays import FloatArray
-from glisson.preoperative.signed_distance import signed_distance_of_mask
+from glisson.preoperative.contours.signed_distance import signed_distance_of_mask
 
 _BEND = 0.4
 """How far an outline may lie from the blend of the corrected ones, for each mm to the nearer of them …"""

@@ -1,4 +1,4 @@
-"""The child process in which Mmg runs: `python -m glisson.preoperative.mmg_process IN OUT`.
+"""The child process in which Mmg runs: `python -m glisson.preoperative.meshing.mmg_process IN OUT`.
 
 The C library does not listen to Ctrl-C; in a process of its own it does no harm. IN is an .npz with
 `nodes` (n, 3) mm, `tetrahedra` (m, 4), `longest_mm`, `shortest_mm` and `envelope_mm`; OUT gets `nodes`

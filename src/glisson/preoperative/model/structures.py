@@ -9,8 +9,8 @@ from glisson.core.arrays import FloatArray
 from glisson.core.errors import BadInput
 from glisson.core.image import Grid, LabelMap
 from glisson.core.structures import Curve, Structures, Tumour, VesselTree
-from glisson.preoperative.centrelines import Tree, centreline_trees, path_from
-from glisson.preoperative.surface import MarchingCubes, MarchingCubesParameters
+from glisson.preoperative.meshing.surface import MarchingCubes, MarchingCubesParameters
+from glisson.preoperative.vessels.centrelines import Tree, centreline_trees, path_from
 
 VESSELS = ("portal", "hepatic", "artery")
 """Labels that become vessel trees."""

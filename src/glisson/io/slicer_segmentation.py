@@ -1,0 +1,123 @@
+"""Segmentations as 3D Slicer stores them (`.seg.nrrd`): named segments in layers that may overlap.
+
+Each segment has a label value in one layer of an NRRD image; header fields `SegmentN_…` name them. Reference:
+Slicer's documentation of the segmentation file format (slicer.readthedocs.io, developer guide, segmentations).
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import nrrd
+import numpy as np
+
+from glisson.core import BadInput, LabelMap
+from glisson.io.decoding import decoding
+from glisson.io.label_names import canonical_names
+from glisson.io.nrrd_files import read_layers, write_layers
+from glisson.io.stored_image import as_whole_numbers, whole_type
+from glisson.io.structure_codes import category_and_type
+
+_COLOURS = {
+    "liver": (0.87, 0.51, 0.40),
+    "portal": (0.25, 0.45, 0.85),
+    "hepatic": (0.10, 0.65, 0.80),
+    "artery": (0.85, 0.15, 0.15),
+    "duct": (0.35, 0.70, 0.30),
+    "gallbladder": (0.55, 0.65, 0.30),
+}
+_OTHER_COLOUR = (0.90, 0.80, 0.30)
+
+
+def has_segments(path: Path) -> bool:
+    """Whether an NRRD file names segments.
+
+    Raises:
+        BadInput: absent, or damaged.
+    """
+    with decoding(path, "an NRRD image"), path.open("rb") as file:
+        return bool(_segments(nrrd.read_header(file)))
+
+
+def read_segmentation(path: Path) -> tuple[LabelMap, ...]:
+    """One label map a layer, names made canonical; voxels with values that no segment has are background.
+
+    Slicer crops what it writes to the segments, so the grid may be a part of the scan's.
+
+    Raises:
+        BadInput: damaged, no whole numbers, or a segment refers to a layer that is not there.
+    """
+    header, layers, grid = read_layers(path)
+    with decoding(path, "a segmentation"):
+        segments = _segments(header)
+        if not segments:
+            raise BadInput("it names no segments, so it is a plain image.")
+        names = canonical_names(name for _, _, name in segments)
+        tables: list[dict[int, str]] = [{} for _ in layers]
+        for (layer, value, _), name in zip(segments, names, strict=True):
+            if not 0 <= layer < len(layers):
+                raise BadInput(f"its segment {name!r} lies in layer {layer}, but there are {len(layers)}.")
+            if value in tables[layer]:
+                raise BadInput(f"its segments {tables[layer][value]!r} and {name!r} share label {value} of one layer.")
+            tables[layer][value] = name
+        maps = []
+        for voxels, table in zip(layers, tables, strict=True):
+            numbers = as_whole_numbers(voxels)
+            unnamed = [int(number) for number in np.unique(numbers) if number != 0 and number not in table]
+            maps.append(LabelMap(np.where(np.isin(numbers, unnamed), 0, numbers), grid, table))
+        return tuple(maps)
+
+
+def write_segmentation(path: Path, maps: Sequence[LabelMap]) -> None:
+    """Write label maps on one grid, a layer each; atomic.
+
+    Raises:
+        BadInput: there is none, they lie on different grids, or the place cannot be written.
+        WriteFailed: the disk is full.
+    """
+    if not maps or not all(labels.grid.matches(maps[0].grid) for labels in maps):
+        raise BadInput(f"{path}: a segmentation needs label maps that all lie on one grid.")
+    grid = maps[0].grid
+    kind = whole_type(0, max(int(labels.voxels.max()) for labels in maps))
+    said: dict[str, Any] = {
+        "Segmentation_ContainedRepresentationNames": "Binary labelmap|",
+        "Segmentation_MasterRepresentation": "Binary labelmap",
+        "Segmentation_ReferenceImageExtentOffset": "0 0 0",
+    }
+    count = 0
+    for layer, labels in enumerate(maps):
+        for value, name in labels.names.items():
+            said |= {f"Segment{count}_{key}": text for key, text in _segment(name, layer, value, grid.shape).items()}
+            said[f"Segment{count}_ID"] = f"Segment_{count + 1}"
+            count += 1
+    write_layers(path, [labels.voxels.astype(kind) for labels in maps], grid, said)
+
+
+def _segments(header: Mapping[str, Any]) -> list[tuple[int, int, str]]:
+    """Layer, label value and name of each segment."""
+    found = []
+    number = 0
+    while f"Segment{number}_ID" in header or f"Segment{number}_LabelValue" in header:
+        named = str(header.get(f"Segment{number}_Name") or header.get(f"Segment{number}_ID") or f"segment {number + 1}")
+        # Slicer 4.10 and older has a layer for each segment and neither field.
+        layer = int(header.get(f"Segment{number}_Layer", number))
+        found.append((layer, int(header.get(f"Segment{number}_LabelValue", 1)), named))
+        number += 1
+    return found
+
+
+def _segment(name: str, layer: int, value: int, shape: tuple[int, int, int]) -> dict[str, str]:
+    category, kind = category_and_type(name)
+    codes = "~".join(f"{code.scheme_designator}^{code.value}^{code.meaning}" for code in (category, kind))
+    colour = _COLOURS.get(name, _OTHER_COLOUR)
+    return {
+        "Name": name,
+        "NameAutoGenerated": "0",
+        "Color": " ".join(f"{part:g}" for part in colour),
+        "ColorAutoGenerated": "0",
+        "Extent": " ".join(f"0 {n - 1}" for n in shape),
+        "LabelValue": str(value),
+        "Layer": str(layer),
+        "Tags": f"TerminologyEntry:Segmentation category and type - DICOM master list~{codes}~^^~"
+        "Anatomic codes - DICOM master list~^^~^^|",
+    }

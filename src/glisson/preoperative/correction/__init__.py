@@ -1,0 +1,1 @@
+"""What a person corrects, carried on to the slices between, with undo."""

@@ -1,0 +1,1 @@
+"""The liver's mask: from a click, or from another tool's labels."""

@@ -1,0 +1,1 @@
+"""The organ's model: regions, attachments, and what is embedded in it."""

@@ -1,0 +1,1 @@
+"""The manoeuvre that is proposed: where a lever would go."""

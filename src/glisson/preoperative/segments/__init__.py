@@ -1,0 +1,1 @@
+"""Couinaud's segments and the resections that are made of them."""

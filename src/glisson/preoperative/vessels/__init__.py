@@ -1,0 +1,1 @@
+"""Centrelines and trees of vessels and ducts."""
