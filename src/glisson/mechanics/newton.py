@@ -27,9 +27,8 @@ _RENEWALS = 12  # iterations in which points that leave lose their cohesion at o
 _PATCHED_HALVINGS = 6
 _LONGEST_PAUSE = 7  # iterations between attempts at exact contact that failed
 _INNER_TOLERANCE = 0.1  # of the outer one
-_FIRST_ACCURACY = (
-    1e-3  # of the first-order answer to a load step; a rough one moves the organ only beside what is carried
-)
+_FIRST_ACCURACY = 0.1  # of the first-order answer to a load step …
+_CARRIED_ACCURACY = 1e-3  # … in which nodes are carried: a rough one moves the organ only beside them
 _LOOSEST = 0.1  # accuracy of a Newton step
 _LOOSE_STEPS = 8  # steps in a row of a body that nothing holds, before its free motion is looked for
 
@@ -155,7 +154,8 @@ class Newton:
         change = np.where(body.fixed, 0.0, change)
         if patch is None:
             forces = balance.unbalanced + change
-            direction = self._direction(positions, touches, forces, _FIRST_ACCURACY, blocks)
+            accuracy = _CARRIED_ACCURACY if carried.any() else _FIRST_ACCURACY
+            direction = self._direction(positions, touches, forces, accuracy, blocks)
             step = None if direction is None else direction.step
         else:
             answer = self._condenser.step(
