@@ -8,13 +8,16 @@ import pydicom
 import pytest
 import SimpleITK
 from pydicom.pixels import pack_bits
+from pydicom.sr.codedict import codes
 from pydicom.uid import ExplicitVRLittleEndian, SegmentationStorage, generate_uid
 
 from dicom_samples import item, write_series
 from glisson.core import BadInput, Grid, LabelMap
 from glisson.io.dicom import read_dicom_folder
+from glisson.io.dicom_segmentation import _ALGORITHM
 from glisson.io.images import read_label_maps, read_labels, write_segments
 from glisson.io.label_groups import on_grid_of
+from glisson.io.structure_codes import CODES
 
 
 def overlapping_maps(grid: Grid) -> list[LabelMap]:
@@ -180,10 +183,28 @@ def test_pydicom_reads_what_we_write(tmp_path, scan_folder):
     assert seen == sum(int(mask.sum()) for mask in wanted.values())
 
 
-def foreign_segmentation(path: Path, frames: np.ndarray, places: list[float], numbers: list[int]) -> None:
+def test_codes_are_those_of_the_standard():
+    """pydicom has DICOM's own tables of SNOMED codes."""
+    listed = [code.value for code in (getattr(codes.SCT, name) for name in codes.SCT.dir())]
+    for name, code in CODES.items():
+        assert code.scheme == "SCT"
+        assert code.value in listed, name
+        assert any(word in code.meaning.lower() for word in (name, "vein", "vena", "artery", "bile", "wire"))
+    assert codes.cid7162.DeformableModels.value == _ALGORITHM.value
+
+
+NEOPLASM = ("108369006", "SCT", "Neoplasm")
+
+
+def foreign_segmentation(
+    path: Path,
+    frames: np.ndarray,
+    places: list[float],
+    numbers: list[int],
+    labels: tuple[str, ...] = ("Leber", "Lesion 7"),
+    types: tuple[tuple[str, str, str], ...] = (("10200004", "SCT", "Liver"), NEOPLASM),
+) -> None:
     """A segmentation of another program: bits packed, frames in no order, empty ones left out."""
-    labels = ["Leber", "Lesion 7"]
-    types = [("10200004", "SCT", "Liver"), ("108369006", "SCT", "Neoplasm")]
     meta = pydicom.dataset.FileMetaDataset()
     meta.MediaStorageSOPClassUID = SegmentationStorage
     meta.MediaStorageSOPInstanceUID = generate_uid()
@@ -265,6 +286,27 @@ def test_segmentation_of_another_program(tmp_path, scan_folder):
         for frame, k, of in zip(frames, slices, numbers, strict=True):
             wanted[:, :, k] |= frame.T if of == number else False
         assert np.array_equal(found[name], wanted), name
+
+
+@pytest.mark.parametrize(
+    ("label", "kind", "name"),
+    [
+        ("Pfortader", ("32764006", "SCT", "Portal vein"), "portal"),
+        ("Leber", ("T-62000", "SRT", "Liver"), "liver"),  # the same code before 2018
+        ("hepatic", ("10200004", "SCT", "Liver"), "hepatic"),  # the label is clearer than the code
+        ("Milz", ("78961009", "SCT", "Spleen"), "Milz"),
+    ],
+)
+def test_names_of_foreign_segments(tmp_path, label, kind, name):
+    frames = np.ones((3, 40, 36), bool)
+    foreign_segmentation(tmp_path / "seg", frames, [0.0, 2.5, 5.0], [1, 1, 2], (label, "Lesion 7"), (kind, NEOPLASM))
+    assert set(masks(read_label_maps(tmp_path / "seg"))) == {name, "tumour7"}
+
+
+def test_a_mask_series_is_read_though_other_files_lie_beside_it(tmp_path, scan_folder):
+    write_segments(scan_folder / "zz.seg.nrrd", overlapping_maps(read_dicom_folder(scan_folder).grid))
+    (labels,) = read_label_maps(scan_folder)
+    assert dict(labels.names) == {1: "scan"}
 
 
 def test_frames_far_apart_do_not_fill_the_memory(tmp_path):

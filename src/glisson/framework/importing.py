@@ -4,7 +4,6 @@ Only voxels, geometry and the names of known structures are taken over. A label 
 is left out, since a name that somebody typed may be a patient's.
 """
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,13 +14,13 @@ from glisson.framework.case import ORGAN, SCAN, STRUCTURES, TUMOURS, Case, new_c
 from glisson.framework.settings import GIVEN_LABELS, Settings
 from glisson.io.images import read_label_maps, read_volume, write_labels, write_volume
 from glisson.io.label_groups import group_labels, on_grid_of
-from glisson.io.label_names import canonical_name
+from glisson.io.label_names import canonical_name, is_canonical
 from glisson.io.totalsegmentator import class_names
 
 GROUP_FILES = {"organ": ORGAN, "tumours": TUMOURS, "structures": STRUCTURES}
 """Label group → its file in the case folder."""
 
-_KNOWN = {"liver", "portal", "hepatic", "artery", "duct", "wire", "gallbladder", "ivc", "bone", "skin"}
+_ALSO_KNOWN = {"bone", "skin"}
 
 
 @dataclass(frozen=True)
@@ -103,4 +102,4 @@ def _with_known_names(labels: LabelMap) -> LabelMap:
 
 def _is_known(name: str) -> bool:
     canonical = {canonical_name(other) for other in class_names().values()}
-    return name in _KNOWN or name in canonical or re.fullmatch(r"tumour\d+", name) is not None
+    return is_canonical(name) or name in _ALSO_KNOWN or name in canonical

@@ -63,10 +63,16 @@ def series_slices(folder: Path) -> tuple[list[Slice], Grid]:
     return _checked_slices(_one_series(folder, None), needs_rescale=False)
 
 
+def first_image(folder: Path) -> Path | None:
+    """The first DICOM image that lies directly in a folder, by name; None where there is none."""
+    with quiet():
+        first = next(image_files(folder), None)
+    return None if first is None else first.path
+
+
 def has_dicom(folder: Path) -> bool:
     """Whether DICOM images lie directly in a folder."""
-    with quiet():
-        return next(image_files(folder), None) is not None
+    return first_image(folder) is not None
 
 
 @contextmanager

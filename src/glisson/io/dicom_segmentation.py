@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pydicom
 from numpy.typing import NDArray
-from pydicom.sr.codedict import codes
 from pydicom.uid import SegmentationStorage, generate_uid
 
 import glisson
@@ -22,37 +21,37 @@ from glisson.io.decoding import check_image_size, decoding
 from glisson.io.dicom import quiet, series_slices
 from glisson.io.dicom_headers import Slice, read_header
 from glisson.io.label_groups import on_grid_of
-from glisson.io.label_names import canonical_name, canonical_names
+from glisson.io.label_names import canonical_name, canonical_names, is_canonical
 from glisson.io.stored_image import in_c_order
-from glisson.io.structure_codes import category_and_type, name_of_code
+from glisson.io.structure_codes import CODES, StructureCode, category_and_type
 
 _NEEDED = ("StudyInstanceUID", "SeriesInstanceUID", "SOPClassUID", "SOPInstanceUID", "FrameOfReferenceUID")
 _MAY_BE_EMPTY = (
     *("PatientID", "PatientName", "PatientBirthDate", "PatientSex", "ReferringPhysicianName"),
     *("AccessionNumber", "StudyID", "StudyDate", "StudyTime", "PositionReferenceIndicator"),
 )
+_ALGORITHM = StructureCode("123111", "DCM", "Deformable Models")
 _LABEL_MAP_STORAGE = "1.2.840.10008.5.1.4.1.1.66.7"  # younger than pydicom's table
 _STORAGES = (SegmentationStorage, _LABEL_MAP_STORAGE)
 
 
 def is_dicom_segmentation(path: Path) -> bool:
     """Whether a file is a DICOM segmentation."""
-    header = read_header(path) if path.is_file() else None
+    with quiet():
+        header = read_header(path) if path.is_file() else None
     return header is not None and header.get("SOPClassUID") in _STORAGES
 
 
 def read_dicom_segmentation(path: Path) -> tuple[LabelMap, ...]:
-    """The segments of a file, names made canonical, in as few label maps as their overlaps allow.
+    """The segments of a file that `is_dicom_segmentation`, names made canonical, in as few maps as overlaps allow.
 
     A segment is called by its label, or by its code where the label says nothing that Glisson knows. Of fractional
     segments the voxels of a half and more count.
 
     Raises:
-        BadInput: damaged, too large, no segmentation, or without a regular grid.
+        BadInput: damaged, too large, or without a regular grid.
     """
     with decoding(path, "a DICOM segmentation"), quiet():
-        if not is_dicom_segmentation(path):
-            raise BadInput("it is no DICOM segmentation.")
         segmentation = _highdicom().seg.segread(path, lazy_frame_retrieval=True)
         grid = _grid(segmentation)
         numbers = list(segmentation.segment_numbers)
@@ -108,10 +107,11 @@ def _grid(segmentation: Any) -> Grid:
 
 
 def _name(segment: Any) -> str:
-    label = segment.segment_label
-    code = segment.segmented_property_type
-    known = name_of_code(code.value, code.scheme_designator)
-    return known if known is not None and canonical_name(label) == label else label
+    label = str(segment.segment_label)
+    if is_canonical(canonical_name(label)):
+        return label
+    code = segment.segmented_property_type  # equal to its like in SNOMED's older scheme, too
+    return next((name for name, known in CODES.items() if code == _coded(known)), label)
 
 
 def _into_layer(layers: list[tuple[NDArray[np.uint8], dict[int, str]]], mask: NDArray[np.bool_], name: str) -> None:
@@ -146,21 +146,26 @@ def _highdicom() -> Any:
         raise BadInput("DICOM segmentations need the package highdicom, which is not installed; use .seg.nrrd.")
     import highdicom  # slow to load, and the package has no wheels for the latest Pythons
     import highdicom.seg
+    import highdicom.sr
 
     return highdicom
+
+
+def _coded(code: StructureCode) -> Any:
+    return _highdicom().sr.CodedConcept(code.value, code.scheme, code.meaning)
 
 
 def _segmentation(sources: Sequence[Any], pixels: NDArray[np.bool_], names: Sequence[str]) -> Any:
     highdicom = _highdicom()
     algorithm = highdicom.AlgorithmIdentificationSequence(
-        name="Glisson", version=glisson.__version__, family=codes.cid7162.DeformableModels
+        name="Glisson", version=glisson.__version__, family=_coded(_ALGORITHM)
     )
     descriptions = [
         highdicom.seg.SegmentDescription(
             segment_number=number,
             segment_label=name,
-            segmented_property_category=category_and_type(name)[0],
-            segmented_property_type=category_and_type(name)[1],
+            segmented_property_category=_coded(category_and_type(name)[0]),
+            segmented_property_type=_coded(category_and_type(name)[1]),
             algorithm_type="SEMIAUTOMATIC",
             algorithm_identification=algorithm,
         )

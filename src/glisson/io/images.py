@@ -8,7 +8,7 @@ import numpy as np
 
 from glisson.core import BadInput, LabelMap, Volume
 from glisson.io.decoding import decoding
-from glisson.io.dicom import has_dicom, read_dicom_folder, read_dicom_mask
+from glisson.io.dicom import first_image, read_dicom_folder, read_dicom_mask
 from glisson.io.dicom_segmentation import is_dicom_segmentation, read_dicom_segmentation, write_dicom_segmentation
 from glisson.io.ircad import read_mask_folders
 from glisson.io.label_names import canonical_name, canonical_table
@@ -89,13 +89,12 @@ def read_label_maps(
         raise BadInput(f"Unknown label scheme {scheme!r}; use one of {list(SCHEMES)}.")
     if not source.is_dir():
         return _maps_of_file(source, scheme, names)
+    first = first_image(source)
+    if first is not None and not is_dicom_segmentation(first):
+        return (_named_labels(source, read_dicom_mask(source), scheme, names),)
     visible = [file for file in sorted(source.iterdir()) if not file.name.startswith(".")]
     found = [file for file in visible if file.name.lower().endswith(_IMAGES) or is_dicom_segmentation(file)]
-    if found:
-        return tuple(labels for file in found for labels in _maps_of_file(file, scheme, names))
-    if has_dicom(source):
-        return (_named_labels(source, read_dicom_mask(source), scheme, names),)
-    return read_mask_folders(source)
+    return tuple(labels for file in found for labels in _maps_of_file(file, scheme, names)) or read_mask_folders(source)
 
 
 def _maps_of_file(path: Path, scheme: str | None, names: Mapping[int, str] | None) -> tuple[LabelMap, ...]:

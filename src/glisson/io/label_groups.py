@@ -63,10 +63,7 @@ def require_same_grid(reference: Volume | LabelMap | Grid, other: Volume | Label
     wanted = reference if isinstance(reference, Grid) else reference.grid
     found = other if isinstance(other, Grid) else other.grid
     if not wanted.matches(found):
-        raise BadInput(
-            f"{what[:1].upper()}{what[1:]} lies on another grid than the scan: {_described(found)}, but the scan has "
-            f"{_described(wanted)}; resample it onto the scan's grid with nearest neighbours."
-        )
+        raise _another_grid(wanted, found, what)
 
 
 def on_grid_of(reference: Volume | Grid, labels: LabelMap, what: str) -> LabelMap:
@@ -87,7 +84,7 @@ def on_grid_of(reference: Volume | Grid, labels: LabelMap, what: str) -> LabelMa
     turn = wanted.direction.T @ labels.grid.direction
     order = np.abs(turn).argmax(axis=1)
     if sorted(order) != [0, 1, 2]:
-        require_same_grid(wanted, labels, what)
+        raise _another_grid(wanted, labels.grid, what)
     voxels = labels.voxels.transpose(order)
     flipped = [axis for axis in range(3) if turn[axis, order[axis]] < 0.0]
     first = np.zeros(3)
@@ -101,8 +98,7 @@ def on_grid_of(reference: Volume | Grid, labels: LabelMap, what: str) -> LabelMa
     )
     placed = _filled_up(wanted, grid, np.flip(voxels, tuple(flipped)))
     if placed is None:
-        require_same_grid(wanted, labels, what)
-        placed = voxels
+        raise _another_grid(wanted, labels.grid, what)
     return LabelMap(placed, wanted, labels.names)
 
 
@@ -125,6 +121,13 @@ def _filled_up(wanted: Grid, grid: Grid, voxels: NDArray[Any]) -> NDArray[Any] |
     whole = np.zeros(wanted.shape, dtype=voxels.dtype)
     whole[tuple(slice(a + s.start, a + s.stop) for a, s in zip(start.tolist(), inside, strict=True))] = voxels[inside]
     return whole
+
+
+def _another_grid(wanted: Grid, found: Grid, what: str) -> BadInput:
+    return BadInput(
+        f"{what[:1].upper()}{what[1:]} lies on another grid than the scan: {_described(found)}, but the scan has "
+        f"{_described(wanted)}; resample it onto the scan's grid with nearest neighbours."
+    )
 
 
 def _stacked(masks: dict[str, NDArray[np.bool_]], grid: Grid) -> LabelMap:

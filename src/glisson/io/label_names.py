@@ -24,6 +24,7 @@ _CANONICAL = {
     "biliarytract": "duct",
     "guidewire": "wire",
 }
+_PLAIN = ("liver", "gallbladder", "portal", "hepatic", "artery", "duct", "wire", "ivc")
 _TUMOUR = re.compile(r"^(?:liver|hepatic)?(?:tumou?r|lesion|metastas[ie]s)s?0*(\d*)$")
 
 
@@ -33,9 +34,14 @@ def canonical_name(name: str) -> str:
     tumour = _TUMOUR.match(plain)
     if tumour:
         return f"tumour{tumour.group(1) or 1}"
-    if plain in ("liver", "gallbladder", "portal", "hepatic", "artery", "duct", "wire", "ivc"):
+    if plain in _PLAIN:
         return plain
     return _CANONICAL.get(plain, name)
+
+
+def is_canonical(name: str) -> bool:
+    """Whether a name is one of Glisson's own."""
+    return name in _PLAIN or re.fullmatch(r"tumour\d+", name) is not None
 
 
 def canonical_names(names: Iterable[str]) -> list[str]:

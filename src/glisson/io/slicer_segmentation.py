@@ -108,7 +108,7 @@ def _segments(header: Mapping[str, Any]) -> list[tuple[int, int, str]]:
 
 def _segment(name: str, layer: int, value: int, shape: tuple[int, int, int]) -> dict[str, str]:
     category, kind = category_and_type(name)
-    codes = "~".join(f"{code.scheme_designator}^{code.value}^{code.meaning}" for code in (category, kind))
+    codes = "~".join(f"{code.scheme}^{code.value}^{code.meaning}" for code in (category, kind))
     colour = _COLOURS.get(name, _OTHER_COLOUR)
     return {
         "Name": name,

@@ -1,48 +1,43 @@
-"""SNOMED CT codes of structures, as DICOM segmentations name them (PS3.16, context groups 7150 to 7166)."""
+"""Codes of structures, as segmentations name them (DICOM PS3.16, context groups 7150 to 7166; SNOMED CT)."""
 
 import re
+from typing import NamedTuple
 
-from pydicom.sr.codedict import codes
-from pydicom.sr.coding import Code
 
-_ANATOMY, _ALTERED = codes.SCT.AnatomicalStructure, Code("49755003", "SCT", "Morphologically Altered Structure")
-_OBJECT = codes.SCT.PhysicalObject
+class StructureCode(NamedTuple):
+    """A code, its coding scheme and its meaning, in the order of DICOM's own triplets."""
 
-_STRUCTURES = {
-    "liver": codes.SCT.Liver,
-    "portal": codes.SCT.PortalVein,
-    "hepatic": codes.SCT.HepaticVein,
-    "artery": codes.SCT.HepaticArtery,
-    "duct": codes.SCT.BileDuct,
-    "gallbladder": codes.SCT.Gallbladder,
-    "ivc": codes.SCT.InferiorVenaCava,
-    "bone": codes.SCT.Bone,
-    "skin": codes.SCT.Skin,
-    "segment 1": codes.SCT.CouinaudHepaticSegmentI,
-    "segment 2": codes.SCT.CouinaudHepaticSegmentII,
-    "segment 3": codes.SCT.CouinaudHepaticSegmentIII,
-    "segment 4": codes.SCT.CouinaudHepaticSegmentIV,
-    "segment 5": codes.SCT.CouinaudHepaticSegmentV,
-    "segment 6": codes.SCT.CouinaudHepaticSegmentVI,
-    "segment 7": codes.SCT.CouinaudHepaticSegmentVII,
-    "segment 8": codes.SCT.CouinaudHepaticSegmentVIII,
+    value: str
+    scheme: str
+    meaning: str
+
+
+_ANATOMY = StructureCode("91723000", "SCT", "Anatomical Structure")
+_ALTERED = StructureCode("49755003", "SCT", "Morphologically Altered Structure")
+_OBJECT = StructureCode("260787004", "SCT", "Physical object")
+_NEOPLASM = StructureCode("108369006", "SCT", "Neoplasm")
+
+CODES = {
+    "liver": StructureCode("10200004", "SCT", "Liver"),
+    "portal": StructureCode("32764006", "SCT", "Portal vein"),
+    "hepatic": StructureCode("8993003", "SCT", "Hepatic vein"),
+    "artery": StructureCode("76015000", "SCT", "Hepatic artery"),
+    "duct": StructureCode("28273000", "SCT", "Bile duct"),
+    "gallbladder": StructureCode("28231008", "SCT", "Gallbladder"),
+    "ivc": StructureCode("64131007", "SCT", "Inferior vena cava"),
+    "wire": StructureCode("272224001", "SCT", "Guide Wire"),
+    "bone": StructureCode("272673000", "SCT", "Bone"),
+    "skin": StructureCode("39937001", "SCT", "Skin"),
 }
+"""Canonical names of structures that have a code of their own; a neoplasm's says too little of which one it is."""
+
 _OWN_SCHEME = "99GLISSON"
 """Private coding scheme of structures that have no code here."""
 
 
-def category_and_type(name: str) -> tuple[Code, Code]:
+def category_and_type(name: str) -> tuple[StructureCode, StructureCode]:
     """Codes for the category of a structure and for what it is, from its canonical name."""
-    if name in _STRUCTURES:
-        return _ANATOMY, _STRUCTURES[name]
     if re.fullmatch(r"tumour\d+", name):
-        return _ALTERED, codes.SCT.Neoplasm
-    if name == "wire":
-        return _OBJECT, codes.SCT.GuideWire
-    return _ANATOMY, Code(re.sub(r"\W+", "-", name)[:16], _OWN_SCHEME, name[:64])
-
-
-def name_of_code(value: str, scheme: str) -> str | None:
-    """Canonical name of a coded structure; None where its code is none of ours or says too little (a neoplasm)."""
-    known = {code.value: name for name, code in (_STRUCTURES | {"wire": codes.SCT.GuideWire}).items()}
-    return known.get(value) if scheme in ("SCT", "SRT") else None
+        return _ALTERED, _NEOPLASM
+    own = StructureCode(re.sub(r"\W+", "-", name)[:16], _OWN_SCHEME, name[:64])
+    return _OBJECT if name == "wire" else _ANATOMY, CODES.get(name, own)

@@ -172,10 +172,8 @@ class LoadPath:
         if moved is None:
             end = NewtonEnd(self.positions, Status.STAGNATED, 0, float("nan"))
         else:
-            if bend is not None:
-                bent = bend.bent(self.positions, moved)
-                moved = bent if body.is_possible(bent) else moved
-            start_at = self._uninverted(moved)
+            bent = None if bend is None else bend.bent(self.positions, moved)
+            start_at = bent if bent is not None and body.is_possible(bent) else self._uninverted(moved)
             if start_at is None:
                 end = NewtonEnd(self.positions, Status.INVERTED, 0, float("nan"))
             else:

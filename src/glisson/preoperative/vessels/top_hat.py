@@ -13,12 +13,10 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from skimage.filters import threshold_otsu
 
-from glisson.core.image import LabelMap, Volume
 from glisson.core.parameters import parameter
-from glisson.core.protocols import Progress, silent
+from glisson.core.protocols import Progress
 from glisson.preoperative.imaging.diffusion import diffused
-from glisson.preoperative.vessels.contrast import without_crumbs
-from glisson.preoperative.vessels.isotropic import IsotropicBox
+from glisson.preoperative.vessels.tubes import TubeParameters, TubeSegmenter
 
 _EDGE = 20.0
 _SMOOTHING_STEPS = 4
@@ -26,61 +24,37 @@ _FEWEST = 20  # values in a window
 
 
 @dataclass(frozen=True)
-class TopHatParameters:
+class TopHatParameters(TubeParameters):
     """Lengths and thresholds of the six steps."""
 
-    tubes: str = parameter("bright", "Vessels with contrast agent, or ducts.", choices=("bright", "dark"))
-    resolution_mm: float = parameter(1.0, "Voxels are resampled to this size, mm.", 0.3, 3.0)
     radius_mm: float = parameter(8.0, "Radius of the top-hat's disc, larger than any vessel's, mm.", 1.0, 50.0)
     window_mm: float = parameter(14.0, "Side of Otsu's windows, mm (20 pixels of 0.7 mm).", 3.0, 200.0)
     floor: float = parameter(15.0, "Least difference of a window's two classes (HU or grey values).", 0.0, 1e4)
     margin_mm: float = parameter(2.0, "What lies so near to the organ's surface is left out, mm.", 0.0, 20.0)
     ball_mm: float = parameter(1.0, "Radius of the ball of the opening, mm.", 0.0, 10.0)
-    smallest_mm3: float = parameter(300.0, "Smaller pieces are left out, mm³.", 0.0, 1e6)
 
 
-class TopHat:
+class TopHat(TubeSegmenter[TopHatParameters]):
     """Vessels or ducts by top-hat and adaptive threshold."""
 
     name: ClassVar[str] = "top-hat"
     summary: ClassVar[str] = "The dissertation's six steps: diffusion, top-hat, Otsu in windows with a floor, opening."
     Parameters: ClassVar[type[TopHatParameters]] = TopHatParameters
 
-    def __init__(self, parameters: TopHatParameters) -> None:
-        self._parameters = parameters
-
-    @classmethod
-    def missing_dependencies(cls) -> tuple[str, ...]:
-        """Nothing beyond Glisson's own dependencies."""
-        return ()
-
-    def find(self, volume: Volume, organ: LabelMap, progress: Progress = silent) -> LabelMap:
-        """Tubes inside the organ, {1: "vessel"} on the scan's grid.
-
-        Raises:
-            BadInput: the organ's mask is empty.
-        """
+    def _tubes(self, values: NDArray[np.float32], within: NDArray[np.bool_], progress: Progress) -> NDArray[np.bool_]:
         chosen, size = self._parameters, self._parameters.resolution_mm
-        progress(0.0, "smoothing")
-        inside = organ.mask("liver")
-        box = IsotropicBox.around(inside, volume.grid, size)
-        within = box.mask(inside)
-        values = box.values(volume.voxels)
         # Outside is made like inside, or the organ's own border would be the strongest top-hat.
         filled = np.where(within, values, np.float32(np.median(values[within])))
         smooth = diffused(filled, np.full(3, size), _EDGE, _SMOOTHING_STEPS)
         progress(0.2, "top-hat")
-        disc = _ball(chosen.radius_mm / size, 2)[:, :, None]
-        bright = chosen.tubes == "bright"
-        hat = ndimage.white_tophat(smooth, footprint=disc) if bright else ndimage.black_tophat(smooth, footprint=disc)
+        hat = ndimage.white_tophat(smooth, footprint=_ball(chosen.radius_mm / size, 2)[:, :, None])
         progress(0.6, "thresholds")
         found = _above_otsu(hat, within, max(round(chosen.window_mm / size), 2), chosen.floor)
         found &= ndimage.distance_transform_edt(within, sampling=size) > chosen.margin_mm
         progress(0.9, "clean-up")
         if chosen.ball_mm >= size:
             found = ndimage.binary_opening(found, _ball(chosen.ball_mm / size, 3))
-        found = without_crumbs(found, chosen.smallest_mm3, size)
-        return LabelMap((box.back(found) & inside).astype(np.uint8), volume.grid, {1: "vessel"})
+        return found
 
 
 def _above_otsu(hat: NDArray[np.float32], within: NDArray[np.bool_], side: int, floor: float) -> NDArray[np.bool_]:
