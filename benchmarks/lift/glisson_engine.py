@@ -1,4 +1,4 @@
-"""A solver technique of Glisson: `python glisson_engine.py TECHNIQUE MESH OUT`."""
+"""A solver technique of Glisson: `python glisson_engine.py TECHNIQUE [--without-mkl] MESH OUT`."""
 
 import sys
 import time
@@ -12,6 +12,7 @@ import glisson
 from glisson.core.deformation import Deformation
 from glisson.core.mesh import TetMesh
 from glisson.core.registry import make_technique
+from glisson.mechanics import linear_solvers
 
 _WARM_UP_ELEMENTS = 2_000
 
@@ -39,4 +40,6 @@ def _main(technique: str, problem_path: Path, out: Path) -> None:
 
 
 if __name__ == "__main__":
-    _main(sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3]))
+    if "--without-mkl" in sys.argv:
+        linear_solvers.pardiso_library = lambda: None  # as where MKL is not installed
+    _main(sys.argv[1], Path(sys.argv[-2]), Path(sys.argv[-1]))

@@ -5,6 +5,7 @@ import pytest
 
 from glisson.core import ContactLaw, Material, Move, Scenario, Stage, Status
 from glisson.geometry.boxes import box_mesh
+from glisson.mechanics import linear_solvers
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
 from glisson.verification.bodies import box_model
 
@@ -55,3 +56,15 @@ def test_a_move_that_turns_the_body_inside_out_is_told() -> None:
     answer = _solved(Stage("crush", FREE, gravity=False, fixed=("left",), moves=(Move("right", (-25.0, 0.0, 0.0)),)))
     assert answer.status is not Status.CONVERGED
     assert "crush" in answer.message
+
+
+def test_nothing_but_contact_needs_a_direct_solver(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So MKL, which may not be installed, makes no difference to loads and moves without tools."""
+
+    def refuse(*_args: object) -> None:
+        raise AssertionError("A direct solver was asked for.")
+
+    for name in ("pardiso_library", "SuperLU", "SuperLUCondensation"):
+        monkeypatch.setattr(linear_solvers, name, refuse)
+    pull = Stage("pull", FREE, gravity=False, fixed=("left",), moves=(Move("right", (6.0, 0.0, 4.0)),))
+    assert _solved(pull).status is Status.CONVERGED
