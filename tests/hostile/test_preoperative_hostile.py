@@ -66,16 +66,27 @@ def test_labels_that_cannot_be_used(labels, label, sentence):
 @pytest.mark.parametrize(
     ("seeds", "sentence"),
     [
-        (NO_SEED, "needs a click inside the liver"),
         ([[500.0, 0.0, 0.0]], r"\(500, 0, 0\) mm lies outside the scan, which has x -39 to 39"),
         ([[38.0, 38.0, 38.0]], r"lies in air \(-\d+ HU\)"),
         ([[0.0, 30.0, 0.0]], r"lies in fat \(-\d+ HU\)"),
     ],
-    ids=["none", "outside", "air", "fat"],
+    ids=["outside", "air", "fat"],
 )
 def test_clicks_that_cannot_be_used(seeds, sentence):
     with pytest.raises(BadInput, match=sentence):
         SeededContour(SeededContourParameters()).segment(volume_on(GRID), None, np.array(seeds))
+
+
+def test_a_scan_without_anything_like_a_liver_is_told():
+    """A ball of fat in air, and one of liver on the left."""
+    for x, value in ((-20.0, -90), (20.0, 100)):
+        scan = volume_on(LIVER_GRID)
+        voxels = np.full(scan.grid.shape, -1000, dtype=np.int16)
+        body = mask_of(ellipsoid((0.0, 0.0, 0.0), (38.0, 38.0, 38.0)), scan.grid)
+        voxels[body] = -90
+        voxels[mask_of(ellipsoid((x, 0.0, 0.0), (15.0, 30.0, 30.0)), scan.grid)] = value
+        with pytest.raises(StageFailed, match="No organ like a liver was found"):
+            SeededContour(SeededContourParameters()).segment(Volume(voxels, scan.grid), None, NO_SEED)
 
 
 def test_a_click_needs_a_ct_and_something_like_a_liver():

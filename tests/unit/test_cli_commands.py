@@ -208,3 +208,43 @@ def test_an_unusable_option_is_bad_input_and_changes_nothing(
     assert said["status"] == "bad_input"
     assert words in said["message"]
     assert contents(case) == before
+
+
+def test_clicks_correct_the_mask_and_make_what_follows_out_of_date(case: Path, glisson: Glisson) -> None:
+    """Half of the tumour is taken out of the mask, and a click puts it back."""
+    glisson("run", case)
+    organ = read_labels(case / "labels/organ.nii.gz")
+    whole = organ.mask("liver")
+    tumour = read_labels(case / "labels/tumours.nii.gz").mask("tumour1")
+    cut = LabelMap((whole & ~tumour).astype(np.uint8), GRID, {1: "liver"})
+    write_labels(case / "labels/organ.nii.gz", cut)
+    code, said = glisson("correct", case, "--add", "30,0,6")
+    assert code == 0
+    assert said["volume_before_ml"] == pytest.approx(cut.volume_ml("liver"))
+    corrected = read_labels(case / "labels/organ.nii.gz").mask("liver")
+    assert (corrected & tumour).sum() > 0.9 * tumour.sum()
+    assert (corrected ^ whole).sum() < 0.01 * whole.sum()
+    assert np.array_equal(read_labels(case / "labels/previous-organ.nii.gz").voxels, cut.voxels)
+    code, said = glisson("correct", case, "--remove", "66,0,0")
+    assert code == 0
+    assert said["volume_ml"] < said["volume_before_ml"]
+    assert "mesh" in (case / STALE).read_text()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ([], "nothing to correct"),
+        (["--add", "1,2"], "X,Y,Z"),
+        (["--add", "0,0,0"], "inside the organ already"),
+        (["--remove", "30,0,6", "--remove", "900,0,0"], "outside the scan"),
+    ],
+)
+def test_a_click_that_cannot_be_applied_changes_nothing(
+    case: Path, glisson: Glisson, options: list[str], words: str
+) -> None:
+    before = contents(case)
+    code, said = glisson("correct", case, *options)
+    assert code == 2
+    assert words in said["message"]
+    assert contents(case) == before

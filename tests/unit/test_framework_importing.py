@@ -99,3 +99,16 @@ def test_a_reference_is_a_mask_of_any_origin(files: Path) -> None:
     write_labels(files / "two.nii.gz", LabelMap(voxels, GRID, {1: "spleen", 2: "stomach"}))
     with pytest.raises(BadInput, match="no label 'liver'"):
         compare_with_reference(case, files / "two.nii.gz")
+
+
+def test_text_that_is_drawn_into_the_pixels_is_told(tmp_path: Path) -> None:
+    """By the header, or by pixels that are the same in all slices; the padding about a field of view is no text."""
+    values = stored_values()
+    values[:, :4, :] = 0
+    write_series(tmp_path / "plain", values)
+    assert import_case(tmp_path / "a", tmp_path / "plain").warning is None
+    write_series(tmp_path / "said", values, BurnedInAnnotation="YES")
+    assert "headers say" in str(import_case(tmp_path / "b", tmp_path / "said").warning)
+    values[:, 20:24, 10:20] = 4000
+    write_series(tmp_path / "seen", values)
+    assert "40 pixels are the same in all slices" in str(import_case(tmp_path / "c", tmp_path / "seen").warning)

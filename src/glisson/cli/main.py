@@ -27,6 +27,7 @@ COMMANDS = {
     "demo": "run the whole way on the phantom that ships with Glisson",
     "new": "make a case folder from a scan and label maps; nothing that identifies the patient is copied",
     "segment": "find the liver in the scan, or check and clean a label map that was given",
+    "correct": "correct the liver's mask by clicks into what is missing or too much",
     "mesh": "build the liver's model: surface, tetrahedra, materials, attachments, structures",
     "simulate": "compute what scenario.toml does to the liver (runs the stages before it where they are out of date)",
     "navigate": "tell where tumours, planes and volumes are now (runs the stages before it where they are out of date)",

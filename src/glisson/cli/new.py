@@ -31,7 +31,11 @@ def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
     text = f"case      {made.case.folder}\nlabels    {', '.join(made.labels) or 'none'}"
     if made.left_out:
         text += f"\nleft out  {made.left_out} labels of unknown names"
-    values = {"case": str(made.case.folder), "labels": made.labels, "left_out": made.left_out}
+    if made.warning:
+        text += f"\nwarning   {made.warning}"
+    values = {
+        "case": str(made.case.folder), "labels": made.labels, "left_out": made.left_out, "warning": made.warning
+    }  # fmt: skip
     return Answer(values, text)
 
 

@@ -12,6 +12,7 @@ from glisson.core.errors import BadInput
 from glisson.core.image import LabelMap, Volume
 from glisson.framework.case import ORGAN, SCAN, STRUCTURES, TUMOURS, Case, new_case, open_case
 from glisson.framework.settings import GIVEN_LABELS, Settings
+from glisson.io.burned_in import burned_in_text
 from glisson.io.images import read_label_maps, read_volume, write_labels, write_volume
 from glisson.io.label_groups import group_labels, on_grid_of
 from glisson.io.label_names import canonical_name, is_canonical
@@ -25,11 +26,15 @@ _ALSO_KNOWN = {"bone", "skin"}
 
 @dataclass(frozen=True)
 class Imported:
-    """A new case, the label names it has, and how many labels were left out for their unknown names."""
+    """A new case, the label names it has, how many labels were left out for their unknown names, and a warning.
+
+    `warning` is a sentence where text that may tell who the patient is seems to be drawn into the pixels.
+    """
 
     case: Case
     labels: tuple[str, ...]
     left_out: int
+    warning: str | None
 
 
 def import_case(
@@ -62,7 +67,7 @@ def import_case(
     with new_case(folder, used) as making:
         write_images(making, volume, groups)
     names = tuple(name for group in groups.values() for name in group.names.values())
-    return Imported(open_case(folder), names, left_out)
+    return Imported(open_case(folder), names, left_out, burned_in_text(scan, volume))
 
 
 def write_images(folder: Path, volume: Volume, groups: Mapping[str, LabelMap]) -> None:

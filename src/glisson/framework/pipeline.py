@@ -7,7 +7,7 @@ into the case, all or none. So an interruption, a failure or a full disk leaves 
 import errno
 import shutil
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -125,6 +125,31 @@ class Pipeline:
             {name: record.facts for name, (_, record) in zip(names, done, strict=True) if record is not None},
         )
 
+    def replace(self, case: Case, name: str, write: Callable[[Path], None]) -> None:
+        """Put a file that a person corrected into a case; the one before stays beside it, named `previous-…`.
+
+        Args:
+            case: the case.
+            name: the file, relative to the case folder.
+            write: writes it to the path that it is given.
+
+        Raises:
+            BadInput: the case cannot be written.
+            WriteFailed: the disk is full or failing.
+        """
+        case.check_writable()
+        with exclusive(case.folder), _disk_errors_as_sentences(case):
+            work, place = case.path(_WORK), case.path(name)
+            shutil.rmtree(work, ignore_errors=True)
+            try:
+                (work / name).parent.mkdir(parents=True)
+                write(work / name)
+                before = [(place, _previous(place))] if place.exists() else []
+                put_in_place([*before, (work / name, place)], work)
+                self._mark(case, case.settings())
+            finally:
+                shutil.rmtree(work, ignore_errors=True)
+
     def outdated(self, case: Case) -> dict[str, str]:
         """Stages whose results are out of date: name → why, in a few words."""
         return outdated(self._stages, case, case.settings())
@@ -187,11 +212,15 @@ def _current(
     if found.state is State.GIVEN:
         there = [case.path(name) for name in stage.outputs if case.has(name)]
         lost = [place for place in there if content_hash(place) not in outputs.values()]
-        moves = [(place, place.with_name(f"previous-{place.name}")) for place in lost] + moves
+        moves = [(place, _previous(place)) for place in lost] + moves
     put_in_place(moves, work)
     shutil.rmtree(work, ignore_errors=True)
     heard.ended(stage.name, seconds)
     return seconds, record
+
+
+def _previous(place: Path) -> Path:
+    return place.with_name(f"previous-{place.name}")
 
 
 def _keep_settings(case: Case, settings: Settings) -> None:

@@ -38,7 +38,7 @@ seed = {seed}
 """
 
 _ABOUT = {
-    "segment": "The liver from the scan: 'labels' takes a label map that was given, 'seeded-contour' one click.",
+    "segment": "The liver from the scan: 'labels' takes a label map that was given, 'seeded-contour' a click or none.",
     "surface": "The closed surface of the liver's mask.",
     "mesh": "The tetrahedra inside the surface.",
     "simulate": "The solver of the manoeuvre that scenario.toml describes.",

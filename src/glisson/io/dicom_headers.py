@@ -24,6 +24,7 @@ from glisson.io.decoding import MAX_IMAGE_BYTES, check_image_size, decoding
 _DESCRIBING = [
     "BitsAllocated",
     "BitsStored",
+    "BurnedInAnnotation",
     "Columns",
     "ImageOrientationPatient",
     "ImagePositionPatient",
@@ -92,6 +93,11 @@ class ImageFile:
     def description(self) -> str:
         """What the scanner calls the series."""
         return str(self.header.get("SeriesDescription", "") or "")
+
+    @property
+    def has_burned_in_text(self) -> bool:
+        """Whether the header says that text which tells who the patient is was drawn into the pixels."""
+        return str(self.header.get("BurnedInAnnotation", "") or "").upper() == "YES"
 
     @property
     def frames(self) -> int:

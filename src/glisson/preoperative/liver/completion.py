@@ -1,9 +1,12 @@
 """Tumours at the organ's surface, which its grey-value band leaves out.
 
-A tumour inside is a hole and is simply filled. One at the surface is a compact body, darker than the
-liver, that borders the liver on a good part of its surface; its other side may be fat or lung. A
-neighbouring organ, as dark, borders the liver with a small part of its surface only.
+A tumour inside is a hole and is simply filled. One at the surface leaves a bay: what a ball as large as a
+tumour can't enter. Bays also hold fissures full of fat, which are narrow, and the gallbladder, which is as
+dark as water; a neighbouring organ is not enclosed by the liver as a tumour is. From its bay the tumour is
+followed outward as far as its own grey values go.
 """
+
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,53 +14,45 @@ from scipy import ndimage
 
 from glisson.core.arrays import FloatArray
 from glisson.preoperative.liver.intensity_prior import IntensityPrior
+from glisson.preoperative.liver.piece import like_piece
 
-_DARKEST = 80.0
-"""A tumour is at most so much darker than the liver (HU), and never below the next number (fluid)."""
+_BAY_MM = 25.0
+"""Radius of the ball that does not enter a bay."""
 
-_DARKEST_HU = 20.0
+_DARKEST_HU = -15.0
+"""What is darker is fat."""
 
-_THINNEST_MM = 3.5
-"""Radius of the ball that a tumour must be able to hold: the diaphragm and vessel walls are thinner."""
+_WATER_HU = 25.0
+"""A body with a lower median is a gallbladder or bowel (tumours have liquid parts, too, but more else)."""
 
-_SMALLEST_ML = 0.5
+_THINNEST_MM = 2.5
+"""Radius of the ball that a tumour in its bay must be able to hold: fissures and vessel walls are thinner."""
+
+_SMALLEST_ML = 2.0
+
+_REACH_MM = 45.0
+"""How far from its bay's middle a tumour may go on."""
 
 _RIND_MM = 3.0
 """What surrounds a body is looked at so far around it."""
 
-_LIVER_SHARE = 0.35
-"""Share of liver in the soft tissue around a tumour; on phantoms most have 0.45 to 0.9, and organs 0.37 at most."""
-
-_ENCLOSED_SHARE = 0.25
-"""Share of liver in all that surrounds a tumour, fat and air included; an organ lying in fat beside it has less."""
+_ENCLOSED_SHARE = 0.42
+"""Share of liver in what surrounds a tumour in its bay; on phantoms and scans tumours have 0.44 to 0.66."""
 
 
 def surface_tumours(
     organ: NDArray[np.bool_], smooth: NDArray[np.float32], prior: IntensityPrior, spacing_mm: FloatArray
 ) -> NDArray[np.bool_]:
-    """The dark bodies beside the organ's mask (a, b, c) that it encloses in good part, same shape."""
-    dark = (smooth > max(prior.mean - _DARKEST, _DARKEST_HU)) & (smooth < prior.mean - 0.5 * prior.half_width)
-    dark &= ~organ
+    """The dark bodies in bays of the organ's mask (a, b, c), followed outward, same shape."""
     found = np.zeros(organ.shape, dtype=bool)
-    cores, count = ndimage.label(ndimage.distance_transform_edt(dark, sampling=spacing_mm) > _THINNEST_MM)
-    if count == 0:
+    if not organ.any():
         return found
-    distance, nearest = ndimage.distance_transform_edt(cores == 0, sampling=spacing_mm, return_indices=True)
-    bodies = cores[tuple(nearest)] * (dark & (distance < _THINNEST_MM + 1.0))
-    soft = (smooth > 0.0) & (smooth < 250.0)
-    margin = np.ceil((_RIND_MM + 0.5) / spacing_mm).astype(int)
-    for number, box in enumerate(ndimage.find_objects(bodies), start=1):
-        if box is None:
-            continue
-        wide = tuple(slice(max(s.start - m, 0), s.stop + m) for s, m in zip(box, margin, strict=True))
-        body = bodies[wide] == number
-        if body.sum() * float(np.prod(spacing_mm)) * 1e-3 < _SMALLEST_ML or not organ[wide].any():
-            continue
-        rind = (ndimage.distance_transform_edt(~body, sampling=spacing_mm) <= _RIND_MM) & ~body
-        liver = int((rind & organ[wide]).sum())
-        in_soft_tissue = liver / max(int((rind & (organ[wide] | soft[wide])).sum()), 1)
-        if in_soft_tissue > _LIVER_SHARE and liver > _ENCLOSED_SHARE * int(rind.sum()):
-            found[wide] |= body
+    # All this is local, and the organ fills a small part of the scan.
+    box = _about(organ, spacing_mm)
+    here, values, inside = found[box], smooth[box], organ[box]
+    outside = ~inside & (values < prior.mean - 0.25 * prior.half_width)
+    for body, middle in _bodies(inside, values, prior, spacing_mm):
+        here |= body | like_piece(values, outside, spacing_mm, middle, _REACH_MM)
     return found
 
 
@@ -65,9 +60,43 @@ def without_gaps(
     organ: NDArray[np.bool_], smooth: NDArray[np.float32], spacing_mm: FloatArray, radius_mm: float
 ) -> NDArray[np.bool_]:
     """The mask closed by a ball, but for fat and air, and with everything that a slice encloses (vessels)."""
-    outside = ndimage.distance_transform_edt(~organ, sampling=spacing_mm) > radius_mm
-    closed = ndimage.distance_transform_edt(~outside, sampling=spacing_mm) > radius_mm
-    whole: NDArray[np.bool_] = organ | (closed & (smooth > 0.0))
+    whole: NDArray[np.bool_] = organ | (_closed(organ, spacing_mm, radius_mm) & (smooth > 0.0))
     for k in range(whole.shape[2]):
         whole[:, :, k] = ndimage.binary_fill_holes(whole[:, :, k])
     return whole
+
+
+def _bodies(
+    organ: NDArray[np.bool_], smooth: NDArray[np.float32], prior: IntensityPrior, spacing_mm: FloatArray
+) -> Iterator[tuple[NDArray[np.bool_], tuple[int, int, int]]]:
+    """Each tumour as far as it lies in its bay, and its deepest voxel."""
+    dark = (smooth > _DARKEST_HU) & (smooth < prior.mean - 0.5 * prior.half_width) & ~organ
+    dark &= _closed(organ, spacing_mm, _BAY_MM)
+    depth = ndimage.distance_transform_edt(dark, sampling=spacing_mm)
+    cores, count = ndimage.label(depth > _THINNEST_MM)
+    if count == 0:
+        return
+    distance, nearest = ndimage.distance_transform_edt(cores == 0, sampling=spacing_mm, return_indices=True)
+    bodies = cores[tuple(nearest)] * (dark & (distance < _THINNEST_MM + 1.0))
+    for number in range(1, count + 1):
+        body = bodies == number
+        if body.sum() * float(np.prod(spacing_mm)) * 1e-3 < _SMALLEST_ML or np.median(smooth[body]) < _WATER_HU:
+            continue
+        rind = (ndimage.distance_transform_edt(~body, sampling=spacing_mm) <= _RIND_MM) & ~body
+        if (rind & organ).sum() > _ENCLOSED_SHARE * rind.sum():
+            a, b, c = np.unravel_index(int(np.argmax(np.where(body, depth, 0.0))), body.shape)
+            yield body, (int(a), int(b), int(c))
+
+
+def _closed(organ: NDArray[np.bool_], spacing_mm: FloatArray, radius_mm: float) -> NDArray[np.bool_]:
+    """The mask and what a ball of this radius outside it can't reach; the scan's end is no border."""
+    outside = ndimage.distance_transform_edt(~organ, sampling=spacing_mm) > radius_mm
+    closed: NDArray[np.bool_] = ndimage.distance_transform_edt(~outside, sampling=spacing_mm) > radius_mm
+    return closed
+
+
+def _about(organ: NDArray[np.bool_], spacing_mm: FloatArray) -> tuple[slice, ...]:
+    """The block of a mask and of what a ball may touch about it."""
+    margin = np.ceil(max(_BAY_MM, _REACH_MM) / spacing_mm).astype(int) + 1
+    places = [np.flatnonzero(organ.any(axis=tuple(b for b in range(3) if b != a))) for a in range(3)]
+    return tuple(slice(max(int(p[0] - m), 0), int(p[-1] + m + 1)) for p, m in zip(places, margin, strict=True))

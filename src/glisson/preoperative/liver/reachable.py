@@ -29,12 +29,13 @@ _VESSEL_AREA_MM2 = 250.0
 _LEAST_APART_MM = 8.0
 """Two basins have their deepest points at least about half of this apart."""
 
-_DETAIL_MM = 6.0
-"""Radius below which what hangs on the organ is taken for something else (opening)."""
-
 
 def reachable_region(
-    smooth: NDArray[np.float32], prior: IntensityPrior, spacing_mm: FloatArray, seeds: list[tuple[int, int, int]]
+    smooth: NDArray[np.float32],
+    prior: IntensityPrior,
+    spacing_mm: FloatArray,
+    seeds: list[tuple[int, int, int]],
+    detail_mm: float = 6.0,
 ) -> NDArray[np.bool_]:
     """The organ as far as grey value and shape tell it, (a, b, c); empty when no tissue is near the seeds.
 
@@ -43,6 +44,7 @@ def reachable_region(
         prior: the organ's grey values.
         spacing_mm: voxel spacing (3,).
         seeds: voxels clicked; the basins nearest to them are the organ's.
+        detail_mm: radius below which what hangs on the organ is taken for something else (opening).
     """
     band = np.abs(smooth - prior.mean) < prior.half_width
     filled = _without_vessel_gaps(band, spacing_mm) & (smooth > SOFT_TISSUE_HU[0])
@@ -58,7 +60,7 @@ def reachable_region(
     joined = _joined_basins(basins, count, width, values)
     own = {int(joined[_nearest_label(basins, seed, spacing_mm)]) for seed in seeds}
     region = np.isin(joined[basins], list(own)) & (basins > 0)
-    return opened(region, spacing_mm, _DETAIL_MM)
+    return opened(region, spacing_mm, detail_mm)
 
 
 def opened(region: NDArray[np.bool_], spacing_mm: FloatArray, radius_mm: float) -> NDArray[np.bool_]:

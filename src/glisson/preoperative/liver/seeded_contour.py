@@ -1,8 +1,9 @@
-"""The liver from a CT and one click: localized contours from slice to slice, guarded by grey value and shape.
+"""The liver from a CT and a click or none: localized contours from slice to slice, guarded by grey value and shape.
 
-The click gives the liver's grey values; what of their band belongs together with it, by the width of
-passages and the grey value, is the region that the contours start from (`reachable`), completed by
-surface tumours (`completion`). The contours run from the largest slice to both ends (`propagation`).
+Without a click the start is found (`automatic_start`). The click gives the liver's grey values; what of their
+band belongs together with it, by the width of passages and the grey value, is the region that the contours
+start from (`reachable`), completed by surface tumours (`completion`). The contours run from the largest slice
+to both ends (`propagation`).
 """
 
 from dataclasses import dataclass
@@ -21,22 +22,19 @@ from glisson.core.status import Status
 from glisson.preoperative.contours.localized_contour import LocalizedContourParameters
 from glisson.preoperative.imaging.axial import slice_axis
 from glisson.preoperative.imaging.borders import touched_borders
-from glisson.preoperative.imaging.diffusion import diffused
+from glisson.preoperative.imaging.clicked import checked_clicks, place_text
+from glisson.preoperative.imaging.ct import smoothed_ct
 from glisson.preoperative.imaging.working_grid import WorkingGrid
+from glisson.preoperative.liver.automatic_start import Start, find_start
 from glisson.preoperative.liver.completion import surface_tumours, without_gaps
 from glisson.preoperative.liver.intensity_prior import IntensityPrior, estimate_prior
 from glisson.preoperative.liver.propagation import propagate
 from glisson.preoperative.liver.reachable import opened, reachable_region
 from glisson.preoperative.liver.slice_flags import flag_slices
 
-_VISIBLE_HU = (-300.0, 400.0)
-"""Air and bone are cut to this range before smoothing."""
-
 _CONTOUR_RANGE = 3.0
 """The contour sees grey values up to so many half widths of the liver's band: lung would blind it to fat."""
 
-_EDGE_HU = 20.0
-_SMOOTHING_STEPS = 6
 _GAP_MM = 4.0
 _TUMOUR_ROUNDS = 2
 _SMALLEST_ML = 100.0
@@ -58,10 +56,10 @@ class SeededContourParameters:
 
 
 class SeededContour:
-    """Liver from one click."""
+    """Liver from one click, or from none."""
 
     name: ClassVar[str] = "seeded-contour"
-    summary: ClassVar[str] = "Liver from a contrast CT and one click, by localized contours from slice to slice."
+    summary: ClassVar[str] = "Liver from a contrast CT, with or without a click, by contours from slice to slice."
     Parameters: ClassVar[type[SeededContourParameters]] = SeededContourParameters
 
     def __init__(self, parameters: SeededContourParameters) -> None:
@@ -80,21 +78,21 @@ class SeededContour:
         Args:
             volume: a CT (HU).
             labels: tumours that are known already ("tumour1" and so on); they belong to the liver.
-            seeds_mm: one click or more inside the liver, (n, 3) LPS mm.
+            seeds_mm: clicks inside the liver, (n, 3) LPS mm; without any the widest even tissue on the right is taken.
             progress: told how far it is.
 
         Raises:
-            BadInput: no click, a click outside the scan or in air, fat or bone, labels on another grid, or
-                not a CT.
-            StageFailed: nothing like a liver lies about the click.
+            BadInput: a click outside the scan or in air, fat or bone, labels on another grid, or not a CT.
+            StageFailed: nothing like a liver lies about the click, or is found without one.
         """
-        seeds = _checked_seeds(volume, seeds_mm)
+        _require_ct(volume)
         known = _known_tumours(volume, labels)
         grid = WorkingGrid.of(volume.grid, self._parameters.resolution_mm)
         progress(0.0, "smoothing")
-        clipped = np.clip(volume.voxels, *_VISIBLE_HU)
-        smooth = diffused(grid.working(clipped), grid.spacing_mm, _EDGE_HU, _SMOOTHING_STEPS)
-        clicked = [grid.working_index(index) for index in seeds]
+        smooth = smoothed_ct(volume, grid)
+        start = find_start(smooth, grid, volume.grid) if len(seeds_mm) == 0 else None
+        seeds_mm = np.asarray(seeds_mm if start is None else [start.point_mm], dtype=np.float64).reshape(-1, 3)
+        clicked = [grid.working_index(index) for index in checked_clicks(volume.grid, seeds_mm)]
         _require_soft_tissue(smooth, clicked, seeds_mm)
         prior = estimate_prior(smooth, grid.spacing_mm, clicked)
         if prior is None:
@@ -106,7 +104,7 @@ class SeededContour:
         organ, flags = self._contoured(smooth, region, prior, grid, progress)
         full = ndimage.binary_fill_holes(grid.full(organ) | known)
         flags += [(border.slice_near(volume.grid), border.sentence) for border in touched_borders(full)]
-        flags += _volume_flag(full, volume.grid)
+        flags += _volume_flag(full, volume.grid) + _start_flags(start, full, volume.grid)
         return Segmentation(LabelMap(full.astype(np.uint8), volume.grid, {1: "liver"}), tuple(sorted(flags)))
 
     def _contoured(
@@ -178,38 +176,28 @@ def _reachable_with(
     return reached | tumours if reached.any() else reached
 
 
-def _checked_seeds(volume: Volume, seeds_mm: FloatArray) -> FloatArray:
-    """The clicks as fractional voxel indices (n, 3)."""
+def _require_ct(volume: Volume) -> None:
     if volume.modality != "CT":
         raise BadInput("The technique 'seeded-contour' needs a CT, since it knows HU; give the liver's labels instead.")
-    if len(seeds_mm) == 0:
-        raise BadInput(
-            "The technique 'seeded-contour' needs a click inside the liver; give --seed-point X,Y,Z (LPS mm)."
-        )
-    indices = volume.grid.indices_from_points(np.asarray(seeds_mm, dtype=np.float64).reshape(-1, 3))
-    outside = ((indices < -0.5) | (indices > np.array(volume.grid.shape) - 0.5)).any(axis=1)
-    if outside.any():
-        raise BadInput(
-            f"The click {_place(np.asarray(seeds_mm)[outside][0])} lies outside the scan, which {_extent(volume.grid)}."
-        )
-    return indices
 
 
 def _require_soft_tissue(
     smooth: NDArray[np.float32], clicked: list[tuple[int, int, int]], seeds_mm: FloatArray
 ) -> None:
     kinds = ((-200.0, "air"), (-30.0, "fat"), (250.0, ""), (np.inf, "bone or contrast agent"))
-    for index, seed in zip(clicked, np.asarray(seeds_mm), strict=True):
+    for index, seed in zip(clicked, seeds_mm, strict=True):
         kind = next(name for limit, name in kinds if smooth[index] <= limit)
         if kind:
-            raise BadInput(f"The click {_place(seed)} lies in {kind} ({smooth[index]:.0f} HU); click inside the liver.")
+            raise BadInput(
+                f"The click {place_text(seed)} lies in {kind} ({smooth[index]:.0f} HU); click inside the liver."
+            )
 
 
 def _require_volume(region: NDArray[np.bool_], grid: WorkingGrid, seeds_mm: FloatArray) -> None:
     volume_ml = float(region.sum() * np.prod(grid.spacing_mm)) * 1e-3
     if volume_ml < _SMALLEST_ML:
         raise StageFailed(
-            f"Only {volume_ml:.1f} ml of like tissue hang together about the click {_place(np.asarray(seeds_mm)[0])}; "
+            f"Only {volume_ml:.1f} ml of like tissue hang together about the click {place_text(seeds_mm[0])}; "
             "click in a larger, even part of the liver.",
             Status.STAGNATED,
         )
@@ -225,12 +213,17 @@ def _volume_flag(mask: NDArray[np.bool_], grid: Grid) -> list[tuple[int, str]]:
     return [(largest, f"Unusual volume for a liver: {volume_ml:.0f} ml; parts may be missing, or others included.")]
 
 
-def _place(point: FloatArray) -> str:
-    return "(" + ", ".join(f"{value:.0f}" for value in point) + ") mm"
+def _start_flags(start: Start | None, mask: NDArray[np.bool_], grid: Grid) -> list[tuple[int, str]]:
+    """Where the liver was taken to be without a click, and where else it might be."""
+    if start is None:
+        return []
+    sentence = f"The start was found without a click, at {place_text(start.point_mm)}"
+    if start.rival_mm is not None and not mask[_voxel(start.rival_mm, grid)]:
+        sentence += f"; an organ at {place_text(start.rival_mm)} is almost as wide: if that is the liver, click into it"
+    return [(_voxel(start.point_mm, grid)[slice_axis(grid)], sentence + ".")]
 
 
-def _extent(grid: Grid) -> str:
-    corners = grid.points_from_indices(np.array([(0, 0, 0), grid.shape]) - [[0], [1]])
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    ranges = ", ".join(f"{axis} {a:.0f} to {b:.0f}" for axis, a, b in zip("xyz", low, high, strict=True))
-    return f"has {ranges} mm (LPS)"
+def _voxel(point_mm: FloatArray, grid: Grid) -> tuple[int, int, int]:
+    index = np.rint(grid.indices_from_points(point_mm[None])[0]).astype(int)
+    i, j, k = np.clip(index, 0, np.array(grid.shape) - 1).tolist()
+    return i, j, k

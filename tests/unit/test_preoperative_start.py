@@ -1,0 +1,77 @@
+"""The start without a click, and clicks that correct, on drawn phantoms."""
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from glisson.core import Grid, Volume
+from glisson.core.errors import BadInput
+from glisson.phantom.appearance import draw_ct
+from glisson.phantom.family import make_phantom
+from glisson.preoperative.correction.clicked_mask import Click, ClickedMask
+from glisson.preoperative.liver.seeded_contour import SeededContour, SeededContourParameters
+from preoperative_shapes import dice, ellipsoid, mask_of
+
+NO_CLICK = np.zeros((0, 3))
+SPACING = (2.5, 2.5, 3.0)
+
+
+@pytest.mark.parametrize("member", [201, 202, 203])
+def test_a_liver_is_found_without_a_click(member: int) -> None:
+    """CTs of different phases and noise; heart, spleen, stomach and muscle must not be taken for the liver."""
+    phantom = make_phantom(member, SPACING, appearance=draw_ct(member))
+    found = SeededContour(SeededContourParameters()).segment(phantom.volume, None, NO_CLICK)
+    assert dice(found.labels.mask("liver"), phantom.organ.mask("liver")) >= 0.96
+    (sentence,) = [reason for _, reason in found.flagged_slices if "without a click" in reason]
+    assert "almost as wide" not in sentence
+
+
+def two_balls(gap_hu: int) -> tuple[Volume, np.ndarray, np.ndarray]:
+    """A liver of 100 HU and a second ball of other HU that touches it by a neck, in fat."""
+    grid = Grid((90, 60, 60), [2.0, 2.0, 2.0], [-90.0, -60.0, -60.0])
+    liver = mask_of(ellipsoid((-30.0, 0.0, 0.0), (45.0, 45.0, 45.0)), grid)
+    other = mask_of(ellipsoid((36.0, 0.0, 0.0), (24.0, 24.0, 24.0)), grid) & ~liver
+    voxels = np.select([liver, other], [100, 100 + gap_hu], -90) + np.random.default_rng(3).normal(0, 8, grid.shape)
+    return Volume(voxels.astype(np.int16), grid), liver, other
+
+
+def test_a_click_adds_what_is_missing() -> None:
+    volume, liver, other = two_balls(-45)
+    clicked = ClickedMask(volume, liver)
+    clicked.apply(Click((36.0, 0.0, 0.0), True))
+    assert dice(clicked.mask, liver | other) > 0.98
+    far = np.indices(liver.shape)[0] < 40
+    assert np.array_equal(clicked.mask[far], liver[far])
+
+
+def test_a_click_takes_away_what_is_too_much() -> None:
+    volume, liver, other = two_balls(0)
+    clicked = ClickedMask(volume, liver | other)
+    clicked.apply(Click((36.0, 0.0, 0.0), False))
+    assert dice(clicked.mask, liver) > 0.98
+    assert not clicked.mask[other & ~ndimage.binary_dilation(liver, iterations=2)].any()
+
+
+def test_a_click_that_was_added_is_not_taken_away_with_another() -> None:
+    volume, liver, _ = two_balls(0)
+    clicked = ClickedMask(volume, liver)
+    clicked.apply(Click((36.0, 0.0, 0.0), True))
+    clicked.apply(Click((-60.0, 0.0, 20.0), False))
+    index = np.rint(volume.grid.indices_from_points(np.array([[36.0, 0.0, 0.0]]))[0]).astype(int)
+    assert clicked.mask[tuple(index)]
+
+
+@pytest.mark.parametrize(
+    ("point", "is_organ", "sentence"),
+    [
+        ((-30.0, 0.0, 0.0), True, "inside the organ already"),
+        ((36.0, 0.0, 0.0), False, "outside the organ already"),
+        ((900.0, 0.0, 0.0), True, "outside the scan"),
+    ],
+)
+def test_clicks_that_say_nothing_new_are_refused(point, is_organ, sentence) -> None:
+    volume, liver, _ = two_balls(-45)
+    clicked = ClickedMask(volume, liver)
+    with pytest.raises(BadInput, match=sentence):
+        clicked.apply(Click(point, is_organ))
+    assert np.array_equal(clicked.mask, liver)
