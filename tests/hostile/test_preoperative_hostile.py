@@ -89,10 +89,10 @@ def test_a_scan_without_anything_like_a_liver_is_told():
             SeededContour(SeededContourParameters()).segment(Volume(voxels, scan.grid), None, NO_SEED)
 
 
-def test_a_click_needs_a_ct_and_something_like_a_liver():
+def test_an_mr_needs_a_click_and_a_click_something_like_a_liver():
     segmenter = SeededContour(SeededContourParameters())
-    with pytest.raises(BadInput, match="needs a CT"):
-        segmenter.segment(volume_on(GRID, "MR"), None, np.zeros((1, 3)))
+    with pytest.raises(BadInput, match="In an MR the liver is not found without a click"):
+        segmenter.segment(volume_on(GRID, "MR"), None, NO_SEED)
     small = np.full(GRID.shape, -90, dtype=np.int16)
     small[17:23, 17:23, 17:23] = 100
     with pytest.raises(StageFailed, match="ml of like tissue hang together"):

@@ -6,7 +6,7 @@ from scipy import ndimage
 
 from glisson.core import Grid, Volume
 from glisson.core.errors import BadInput
-from glisson.phantom.appearance import draw_ct
+from glisson.phantom.appearance import draw_ct, draw_mr
 from glisson.phantom.family import make_phantom
 from glisson.preoperative.correction.clicked_mask import Click, ClickedMask
 from glisson.preoperative.liver.seeded_contour import SeededContour, SeededContourParameters
@@ -75,3 +75,14 @@ def test_clicks_that_say_nothing_new_are_refused(point, is_organ, sentence) -> N
     with pytest.raises(BadInput, match=sentence):
         clicked.apply(Click(point, is_organ))
     assert np.array_equal(clicked.mask, liver)
+
+
+@pytest.mark.parametrize("member", [204, 205])
+def test_a_liver_is_found_in_an_mr_from_one_click(member: int) -> None:
+    """Bright liver, dark vessels and tumours, uneven coil sensitivity, Rician noise, a scale that nobody knows."""
+    phantom = make_phantom(member, SPACING, appearance=draw_mr(member))
+    truth = phantom.organ.mask("liver")
+    cells = np.argwhere(truth)
+    click = phantom.volume.grid.points_from_indices(cells[[np.random.default_rng(member).integers(len(cells))]])
+    found = SeededContour(SeededContourParameters()).segment(phantom.volume, None, click)
+    assert dice(found.labels.mask("liver"), truth) >= 0.93

@@ -1,4 +1,4 @@
-"""The liver from a CT and a click or none: localized contours from slice to slice, guarded by grey value and shape.
+"""The liver from a CT and a click or none, or an MR and a click: localized contours from slice to slice.
 
 Without a click the start is found (`automatic_start`). The click gives the liver's grey values; what of their
 band belongs together with it, by the width of passages and the grey value, is the region that the contours
@@ -24,6 +24,7 @@ from glisson.preoperative.imaging.axial import slice_axis
 from glisson.preoperative.imaging.borders import touched_borders
 from glisson.preoperative.imaging.clicked import checked_clicks, place_text
 from glisson.preoperative.imaging.ct import smoothed_ct
+from glisson.preoperative.imaging.mr import smoothed_mr
 from glisson.preoperative.imaging.working_grid import WorkingGrid
 from glisson.preoperative.liver.automatic_start import Start, find_start
 from glisson.preoperative.liver.completion import surface_tumours, without_gaps
@@ -59,7 +60,9 @@ class SeededContour:
     """Liver from one click, or from none."""
 
     name: ClassVar[str] = "seeded-contour"
-    summary: ClassVar[str] = "Liver from a contrast CT, with or without a click, by contours from slice to slice."
+    summary: ClassVar[str] = (
+        "Liver from a CT with or without a click, or an MR with one, by contours from slice to slice."
+    )
     Parameters: ClassVar[type[SeededContourParameters]] = SeededContourParameters
 
     def __init__(self, parameters: SeededContourParameters) -> None:
@@ -76,23 +79,21 @@ class SeededContour:
         """The liver ({1: "liver"}) with its tumours and vessels, and the slices to look at.
 
         Args:
-            volume: a CT (HU).
+            volume: a CT (HU), or an MR.
             labels: tumours that are known already ("tumour1" and so on); they belong to the liver.
-            seeds_mm: clicks inside the liver, (n, 3) LPS mm; without any the widest even tissue on the right is taken.
+            seeds_mm: clicks inside the liver, (n, 3) LPS mm; without any the widest even tissue on the right of a CT
+                is taken.
             progress: told how far it is.
 
         Raises:
-            BadInput: a click outside the scan or in air, fat or bone, labels on another grid, or not a CT.
+            BadInput: a click outside the scan or in air, fat or bone, labels on another grid, or an MR without a click.
             StageFailed: nothing like a liver lies about the click, or is found without one.
         """
-        _require_ct(volume)
         known = _known_tumours(volume, labels)
         grid = WorkingGrid.of(volume.grid, self._parameters.resolution_mm)
         progress(0.0, "smoothing")
-        smooth = smoothed_ct(volume, grid)
-        start = find_start(smooth, grid, volume.grid) if len(seeds_mm) == 0 else None
-        seeds_mm = np.asarray(seeds_mm if start is None else [start.point_mm], dtype=np.float64).reshape(-1, 3)
-        clicked = [grid.working_index(index) for index in checked_clicks(volume.grid, seeds_mm)]
+        smooth, start, seeds_mm = _started(volume, grid, np.asarray(seeds_mm, dtype=np.float64).reshape(-1, 3))
+        clicked = [grid.working_index(index) for index in volume.grid.indices_from_points(seeds_mm)]
         _require_soft_tissue(smooth, clicked, seeds_mm)
         prior = estimate_prior(smooth, grid.spacing_mm, clicked)
         if prior is None:
@@ -176,9 +177,23 @@ def _reachable_with(
     return reached | tumours if reached.any() else reached
 
 
-def _require_ct(volume: Volume) -> None:
+def _started(
+    volume: Volume, grid: WorkingGrid, seeds_mm: FloatArray
+) -> tuple[NDArray[np.float32], Start | None, FloatArray]:
+    """Smoothed values (HU, or on their scale), the start where it was found without a click, and the clicks (n, 3)."""
+    indices = checked_clicks(volume.grid, seeds_mm)
     if volume.modality != "CT":
-        raise BadInput("The technique 'seeded-contour' needs a CT, since it knows HU; give the liver's labels instead.")
+        if len(indices) == 0:
+            raise BadInput(
+                "In an MR the liver is not found without a click, since its signal has no scale; give --seed-point "
+                "X,Y,Z (LPS mm)."
+            )
+        return smoothed_mr(volume, grid, [grid.working_index(index) for index in indices]), None, seeds_mm
+    smooth = smoothed_ct(volume, grid)
+    if len(indices):
+        return smooth, None, seeds_mm
+    start = find_start(smooth, grid, volume.grid)
+    return smooth, start, start.point_mm[None]
 
 
 def _require_soft_tissue(
