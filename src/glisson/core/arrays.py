@@ -30,9 +30,11 @@ def frozen_ints(value: ArrayLike, shape: Sequence[int | None], what: str) -> Int
     """Copy `value` into a read-only int64 array of the given shape (None: any length).
 
     Raises:
-        BadInput: the shape differs, or a number is not whole.
+        BadInput: the shape differs, a number is not whole, or it is a mask.
     """
     raw = np.asarray(value)
+    if raw.dtype.kind == "b":
+        raise BadInput(f"{what} must hold numbers, not true and false; np.flatnonzero makes numbers of a mask.")
     array = np.array(raw, dtype=np.int64, order="C", copy=True)
     _check_shape(array, shape, what)
     if raw.dtype.kind == "f" and not np.array_equal(raw, array):

@@ -73,6 +73,8 @@ class TetMesh:
         if count not in (4, 10):
             raise BadInput("Tetrahedra must have 4 or 10 nodes each.")
         object.__setattr__(self, "tetrahedra", frozen_ints(self.tetrahedra, (None, count), "tetrahedra"))
+        if len(self.tetrahedra) == 0:
+            raise BadInput("A mesh needs at least one tetrahedron.")
         check_range(self.tetrahedra, len(self.nodes), "A tetrahedron")
         regions = np.zeros(len(self.tetrahedra)) if self.regions is None else self.regions
         object.__setattr__(self, "regions", frozen_ints(regions, (len(self.tetrahedra),), "mesh regions"))

@@ -11,6 +11,9 @@ from glisson.core.errors import BadInput
 from glisson.core.mesh import TetMesh
 from glisson.core.structures import Structures
 
+_LARGEST_POISSON_RATIO = 0.499999
+"""Beyond, the bulk modulus is more than 500,000 times the shear modulus, and answers drown in rounding."""
+
 
 @dataclass(frozen=True)
 class Material:
@@ -27,14 +30,17 @@ class Material:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "constants", tuple(self.constants))
+        for number in (self.young_modulus_kpa, self.poisson_ratio, self.density_kg_m3, *self.constants):
+            if isinstance(number, bool) or not isinstance(number, (int, float, np.integer, np.floating)):
+                raise BadInput(f"A material is described by numbers, not by {number!r}.")
         if not np.isfinite(self.constants).all():
             raise BadInput(f"Constants of a material law must be finite numbers, not {list(self.constants)}.")
         if not self.young_modulus_kpa > 0.0 or not np.isfinite(self.young_modulus_kpa):
             raise BadInput(f"Young's modulus must be positive, not {self.young_modulus_kpa} kPa.")
-        if not -1.0 < self.poisson_ratio < 0.5:
+        if not -1.0 < self.poisson_ratio <= _LARGEST_POISSON_RATIO:
             raise BadInput(
-                f"Poisson's ratio must lie above -1 and below 0.5, not {self.poisson_ratio}; "
-                "for nearly incompressible tissue use 0.45 to 0.499."
+                f"Poisson's ratio must lie above -1 and be at most {_LARGEST_POISSON_RATIO}, not "
+                f"{self.poisson_ratio}; for nearly incompressible tissue use 0.45 to 0.499."
             )
         if not 0.0 <= self.density_kg_m3 < 30_000.0:
             raise BadInput(f"Density must lie between 0 and 30000 kg/m³, not {self.density_kg_m3}.")

@@ -106,6 +106,11 @@ class Stage:
     motions: tuple[ToolMotion, ...] = ()
 
     def __post_init__(self) -> None:
+        if isinstance(self.fixed, str):
+            raise BadInput(f"Stage {self.name!r}: fixed is a list of node sets, not the text {self.fixed!r}.")
+        both = sorted({move.node_set for move in self.moves} & set(self.fixed))
+        if both:
+            raise BadInput(f"Stage {self.name!r} both fixes and moves node set {both[0]!r}; it can do one of them.")
         if not 0.0 <= self.gas_pressure_kpa <= 20.0:
             raise BadInput(
                 f"Stage {self.name!r}: the gas pressure must lie in 0 to 20 kPa, not {self.gas_pressure_kpa} kPa "

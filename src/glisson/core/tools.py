@@ -50,13 +50,14 @@ class Board:
             raise BadInput(f"The slot of board {self.name!r} must run along the board.")
 
     def carries(self, points_mm: FloatArray) -> NDArray[np.bool_]:
-        """Whether points (n, 3) lie over the board and not over its slot, (n,)."""
+        """Whether points (n, 3) lie over the board's face, not over its slot or the slot's rounded rim, (n,)."""
         if self.slot is None:
             return np.ones(len(points_mm), dtype=bool)
         away = np.asarray(points_mm) - self.slot.centre_mm
         across = np.cross(self.normal, self.slot.along)
-        beyond: NDArray[np.bool_] = np.abs(away @ self.slot.along) >= 0.5 * self.slot.length_mm
-        return beyond | (np.abs(away @ across) >= 0.5 * self.slot.width_mm)
+        rim = self.slot.edge_radius_mm
+        beyond: NDArray[np.bool_] = np.abs(away @ self.slot.along) >= 0.5 * self.slot.length_mm + rim
+        return beyond | (np.abs(away @ across) >= 0.5 * self.slot.width_mm + rim)
 
 
 @dataclass(frozen=True, eq=False)

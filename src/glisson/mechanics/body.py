@@ -127,7 +127,7 @@ class Body:
         self.law = ContactLaw()
         self.drag: Drag | None = None
         lengths = lumped_volumes(elasticity.rest, elasticity.mesh) ** (1.0 / 3.0)
-        self._least_scale = _NO_SHIFT_MM * elasticity.stiffest_kpa * float(np.linalg.norm(lengths))
+        self._least_scale = _NO_SHIFT_MM * elasticity.softest_kpa * float(np.linalg.norm(lengths))
         self._pattern = block_pattern(elasticity.mesh.tetrahedra, len(elasticity.rest))
         self._pairs = pair_slots(self._pattern, surface.nodes)
         self.hold(fixed)

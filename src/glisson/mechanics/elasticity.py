@@ -49,7 +49,7 @@ class Elasticity:
     def __init__(self, mesh: TetMesh, materials: Mapping[int, Material], rest: FloatArray) -> None:
         self.mesh, self.materials = mesh, materials
         self.rest = rest
-        self.stiffest_kpa = max(material.young_modulus_kpa for material in materials.values())
+        self.softest_kpa = min(materials[int(n)].young_modulus_kpa for n in np.unique(mesh.region_numbers))
         self._quadrature = quadrature(rest, mesh)
         # Each core has a run of chunks, and each chunk one law.
         parts = np.array_split(np.arange(len(mesh.tetrahedra)), min(_CORES, len(mesh.tetrahedra)))

@@ -38,7 +38,7 @@ _ROUGH_TOLERANCE = 1e-2  # while the points that cohere are sought
 class History:
     """What happened in the load steps so far, in the stage of name `stage`.
 
-    `met` are tools that have come near enough to touch at some time, `bearing` moving ones that bear the organ now.
+    `met` are tools that have borne the organ at some time, `bearing` those that bear it now.
     """
 
     stage: str = ""
@@ -289,13 +289,12 @@ class LoadPath:
         for contact, touch in zip(body.contacts, body.touches(end.positions, update_friction=False), strict=True):
             name = contact.tool.name
             bears = float(touch.pressures @ body.surface.areas[touch.points]) > _BEARS_MN
-            if len(touch.points):
-                self.history.met.add(name)
             if contact.tool.moves and name in self.history.bearing and not bears:
                 self.history.bearing.discard(name)
                 at = degrees(contact.angle) if isinstance(contact.tool, LeverTool) else None
                 self.history.events.append(Event("lost_contact", name, at))
             if bears:
+                self.history.met.add(name)
                 self.history.bearing.add(name)
 
     def note(self, reach: float, end: NewtonEnd) -> None:

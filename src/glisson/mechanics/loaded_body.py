@@ -15,6 +15,7 @@ from glisson.mechanics.gas_pressure import GasPressure
 from glisson.mechanics.initial_gaps import settle_gaps
 from glisson.mechanics.loads import fixed_unknowns, gravity_forces
 from glisson.mechanics.membrane import Membrane
+from glisson.mechanics.model_checks import check_model
 from glisson.mechanics.parts import Part
 from glisson.mechanics.rest_shape import RestShape, find_rest_shape
 from glisson.mechanics.sampling import face_parts
@@ -54,8 +55,10 @@ def loaded_body(model: Model, scenario: Scenario, settings: ContactSettings, res
 
     Raises:
         StageFailed: no unloaded shape was found to `rest_accuracy`, a residual over the weight.
-        BadInput: the model lacks a named node set, or a tool cuts deep into the organ.
+        BadInput: the model lacks a named node set or means nothing (`model_checks`), or a tool cuts deep into the
+            organ.
     """
+    check_model(model, scenario)
     mesh = model.mesh
     tools = [make_tool(tool, scenario.stages) for tool in scenario.tools]
     surface = surface_quadrature(mesh.nodes, mesh, face_parts(mesh, tools, scenario.stages))

@@ -1,6 +1,6 @@
 """The solver technique: rest shape, then stage after stage in load steps, each an equilibrium or a status."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from glisson.core.deformation import Deformation
@@ -9,8 +9,11 @@ from glisson.core.model import Model
 from glisson.core.parameters import parameter
 from glisson.core.protocols import Progress, silent
 from glisson.core.scenario import Scenario
+from glisson.core.status import Status
+from glisson.mechanics.free_motion import find_free_motion
 from glisson.mechanics.linear_solvers import make_iterative_solver
 from glisson.mechanics.loaded_body import loaded_body
+from glisson.mechanics.loads import gravity_forces
 from glisson.mechanics.newton import Newton, NewtonSettings
 from glisson.mechanics.numbering import numbering
 from glisson.mechanics.quadratic_model import quadratic_model
@@ -85,6 +88,9 @@ def solve_stages(
         progress(0.0, "finding the unloaded shape")
         body = loaded_body(model, scenario, parameters, rest_accuracy)
     except StageFailed as failure:
+        unheld = _free_motion(model, scenario, parameters)
+        if unheld is not None:
+            return Deformation(model.mesh, (), Status.SINGULAR, f"The unloaded shape was not found: {unheld}.")
         return Deformation(model.mesh, (), failure.status, str(failure))
     settings = NewtonSettings(parameters.tolerance, parameters.iteration_limit)
     newton = Newton(body, make_iterative_solver(), settings)
@@ -92,3 +98,11 @@ def solve_stages(
         return StageRunner(model, scenario, body, newton, carrier, parameters.step_deg, progress).run()
     finally:
         newton.close()
+
+
+def _free_motion(model: Model, scenario: Scenario, parameters: StageParameters) -> str | None:
+    """What nothing held the scanned organ against, in words; None where something did."""
+    body = loaded_body(model, replace(scenario, rest_shape="as-scanned"), parameters, REST_ACCURACY)
+    body.external = gravity_forces(model, scenario.scan_gravity)
+    motion = find_free_motion(body, model.mesh.nodes)
+    return None if motion is None else motion.sentence
