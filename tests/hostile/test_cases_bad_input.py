@@ -11,9 +11,9 @@ import pytest
 
 from dicom_samples import stored_values, write_series
 from glisson.cli.main import main
-from glisson.core.image import Grid, LabelMap
+from glisson.core.image import Grid, LabelMap, Volume
 from glisson.framework.case import ORGAN, SCAN, SCENARIO, SETTINGS
-from glisson.io.images import write_labels, write_volume
+from glisson.io.images import read_volume, write_labels, write_volume
 from small_case import GRID, contents, images, make_small_case, offer_bending, small_settings
 
 Refused = Callable[..., str]
@@ -182,9 +182,12 @@ def test_no_case(tmp_path: Path, refused: Refused) -> None:
 
 
 def test_no_click_for_the_contour(tmp_path: Path, refused: Refused) -> None:
+    """A CT of nothing but fat has no liver to be found; a click may also lie outside."""
     case = make_small_case(tmp_path / "case", small_settings().choosing("segment", "seeded-contour", {}))
     case.path(ORGAN).unlink()
-    assert "seed" in refused(case.folder, 2, "run", case.folder)
+    scan = read_volume(case.path(SCAN))
+    write_volume(case.path(SCAN), Volume(np.full(scan.grid.shape, -90, dtype=np.int16), scan.grid))
+    assert "No organ like a liver" in refused(case.folder, 1, "run", case.folder)
     assert "outside" in refused(case.folder, 2, "run", case.folder, "--seed-point", "900,0,0")
 
 

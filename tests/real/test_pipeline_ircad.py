@@ -18,6 +18,9 @@ pytestmark = pytest.mark.real
 Glisson = Callable[..., tuple[int, dict[str, Any]]]
 
 COARSE = ("--mesh.edge-length-mm", "32", "--mesh.envelope-mm", "3", "--surface.edge-length-mm", "8")
+LESS_COARSE = ("--mesh.edge-length-mm", "24", "--mesh.envelope-mm", "2", "--surface.edge-length-mm", "7")
+"""On the coarser mesh the lift of the liver that is found from a click stagnates in its second stage, where it slips."""
+
 CLICK_MM = "129,155,123"
 """In the right lobe, away from vessels and tumours, as a person would click."""
 
@@ -92,7 +95,7 @@ def test_from_the_scan_and_one_click(
     code, found = glisson("segment", case, "--seed-point", CLICK_MM, "--reference", masks / "liver")
     assert code == 0, found
     plan(case)
-    code, said = glisson("run", case, *COARSE)
+    code, said = glisson("run", case, *LESS_COARSE)
     assert code == 0, said
     check_guidance(said, ircad)
     with capfd.disabled():
@@ -100,5 +103,5 @@ def test_from_the_scan_and_one_click(
             f"\n3D-IRCADb-01 case 17 from one click: Dice {found['dice']:.4f}, mean surface distance "
             f"{found['asd_mm']:.2f} mm, 95 % within {found['hd95_mm']:.2f} mm, {found['seconds']:.0f} s"
         )
-    # The prototypes' one-click figures on this kind of scan begin at 0.91.
-    assert found["dice"] > 0.90
+    assert found["dice"] > 0.945
+    assert found["hd95_mm"] < 10.0

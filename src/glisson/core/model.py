@@ -39,7 +39,7 @@ class Material:
             raise BadInput(f"Young's modulus must be positive, not {self.young_modulus_kpa} kPa.")
         if not -1.0 < self.poisson_ratio <= _LARGEST_POISSON_RATIO:
             raise BadInput(
-                f"Poisson's ratio must lie above -1 and be at most {_LARGEST_POISSON_RATIO}, not "
+                f"Poisson's ratio must lie above -1 and below 0.5 (at most {_LARGEST_POISSON_RATIO}), not "
                 f"{self.poisson_ratio}; for nearly incompressible tissue use 0.45 to 0.499."
             )
         if not 0.0 <= self.density_kg_m3 < 30_000.0:
