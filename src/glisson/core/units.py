@@ -1,9 +1,10 @@
-"""The one place where units are converted.
+"""The one place where units are converted, and how people read a place.
 
 Inside, one consistent set: mm, kPa, mN, s, radians (so mass is in kg, energy in µJ, and
 1 kPa·mm² = 1 mN). People read and write mm, kPa, N, kg/m³ and degrees.
 """
 
+from collections.abc import Iterable
 from math import degrees, radians
 
 STANDARD_GRAVITY_MM_S2 = 9806.65
@@ -35,6 +36,11 @@ def millilitres_from_mm3(volume_mm3: float) -> float:
     return volume_mm3 * 1e-3
 
 
+def place_text(point_mm: Iterable[float]) -> str:
+    """A place for people, to the millimetre: "(12, -5, 130) mm"."""
+    return "(" + ", ".join(f"{coordinate:.0f}" for coordinate in point_mm) + ") mm"
+
+
 __all__ = [
     "STANDARD_GRAVITY_MM_S2",
     "degrees",
@@ -43,5 +49,6 @@ __all__ = [
     "millinewtons_from_newtons",
     "newton_metres_from_internal",
     "newtons_from_millinewtons",
+    "place_text",
     "radians",
 ]

@@ -8,6 +8,7 @@ from scipy.sparse.csgraph import connected_components
 
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.mesh import TetMesh
+from glisson.core.units import place_text
 from glisson.mechanics.body import Body
 
 _HELD_SHARE = 1e-6  # of the body's own stiffness; below it a motion counts as free
@@ -41,8 +42,7 @@ class FreeMotion:
         components = ", ".join(f"{component:+.2f}" for component in vector)
         what = "the organ"
         if self.part_mm is not None:
-            place = ", ".join(f"{coordinate:.0f}" for coordinate in self.part_mm)
-            what = f"the part of the mesh around ({place}) mm hangs together with no other and"
+            what = f"the part of the mesh around {place_text(self.part_mm)} hangs together with no other and"
         if self.is_turn:
             return f"{what} is not held against turning about ({components})"
         nearest, words = max(_AXES, key=lambda axis: float(axis[0] @ vector))

@@ -3,6 +3,7 @@
 import numpy as np
 
 from glisson.core.arrays import FloatArray
+from glisson.core.units import place_text
 from glisson.mechanics.body import Body, LoadState
 
 _SHARES = np.linspace(0.0, 1.0, 33)[1:]  # of the way that are looked at
@@ -30,6 +31,6 @@ def held_in_the_way(body: Body, positions: FloatArray, goal: LoadState) -> str |
             part.angle = state.tools.angles[number]
             cut = np.flatnonzero(free & (part.gaps(points) < -_HAIR_MM))
             if len(cut):
-                where = ", ".join(f"{x:.0f}" for x in points[cut].mean(axis=0))
-                return f"{contact.tool.name!r} would cut into a part that is held fast, at ({where}) mm; move it away"
+                where = place_text(points[cut].mean(axis=0))
+                return f"{contact.tool.name!r} would cut into a part that is held fast, at {where}; move it away"
     return None

@@ -6,6 +6,7 @@ import numpy as np
 
 from glisson.core.arrays import FloatArray
 from glisson.core.errors import BadInput
+from glisson.core.units import place_text
 from glisson.mechanics.contact import ToolContact
 from glisson.mechanics.rest_shape import Support
 
@@ -35,9 +36,9 @@ def settle_gaps(
         gaps = contact.gaps(points_mm)
         deepest = float(gaps.min())
         if deepest < -tolerance_mm:
-            where = ", ".join(f"{x:.0f}" for x in points_mm[int(gaps.argmin())])
+            where = place_text(points_mm[int(gaps.argmin())])
             raise BadInput(
-                f"{contact.tool.name!r} cuts {-deepest:.1f} mm into the organ at ({where}) before anything moves; "
+                f"{contact.tool.name!r} cuts {-deepest:.1f} mm into the organ at {where} before anything moves; "
                 f"at most {tolerance_mm:g} mm can be put down to the segmentation, so move it away."
             )
         cushion = contact.cushion

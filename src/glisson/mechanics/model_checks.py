@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from glisson.core.arrays import FloatArray, IntArray
+from glisson.core.arrays import IntArray
 from glisson.core.errors import BadInput
 from glisson.core.mesh import TET_EDGES, TetMesh
 from glisson.core.model import Model
 from glisson.core.scenario import Scenario, Stage
+from glisson.core.units import place_text
 from glisson.mechanics.elements import quadrature
 from glisson.mechanics.loads import fixed_unknowns
 
@@ -26,17 +27,17 @@ def _check_mesh(mesh: TetMesh) -> None:
     loose = np.flatnonzero(~used)
     if len(loose):
         raise BadInput(
-            f"{len(loose)} nodes of the mesh belong to no tetrahedron, the first at {_place(mesh.nodes[loose[0]])}; "
+            f"{len(loose)} nodes of the mesh belong to no tetrahedron, the first at {place_text(mesh.nodes[loose[0]])}; "
             "leave them out."
         )
     twins = _twins(mesh.corners)
     if len(twins):
-        where = _place(mesh.nodes[mesh.corners[twins[0]]].mean(axis=0))
+        where = place_text(mesh.nodes[mesh.corners[twins[0]]].mean(axis=0))
         raise BadInput(f"{len(twins)} tetrahedra are there twice, the first at {where}; leave the copies out.")
     if mesh.is_quadratic:
         bad = _folded(mesh)
         if len(bad):
-            where = _place(mesh.nodes[mesh.corners[bad[0]]].mean(axis=0))
+            where = place_text(mesh.nodes[mesh.corners[bad[0]]].mean(axis=0))
             raise BadInput(
                 f"{len(bad)} quadratic tetrahedra are folded, the first at {where}: their middle nodes lie off their "
                 "edges or are in another order than 01, 12, 02, 03, 13, 23."
@@ -77,13 +78,9 @@ def _check_holds(model: Model, stage: Stage) -> None:
             axis=1
         )
         if clash.any():
-            where = _place(model.mesh.nodes[nodes[int(np.argmax(clash))]])
+            where = place_text(model.mesh.nodes[nodes[int(np.argmax(clash))]])
             raise BadInput(
                 f"Stage {stage.name!r} moves node set {move.node_set!r}, but holds its node at {where} in another way; "
                 "give each node one goal."
             )
         goals[nodes] = move.displacement_mm
-
-
-def _place(point_mm: FloatArray) -> str:
-    return "(" + ", ".join(f"{value:.0f}" for value in point_mm) + ") mm"

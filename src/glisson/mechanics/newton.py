@@ -22,7 +22,7 @@ _LONGEST_STEP = 0.05  # of the body's diagonal, for any node in one iteration
 _SLOW = 1.5  # share of a residual that an iteration leaves, from which on exact contact may pay
 _STALE_RESCUES = 2  # such steps in a row that may use the stiffness of an earlier one
 _COUPLED_RESIDUAL = 1e-2  # below it friction that follows the pressure is worth its price
-_COUPLED_GAIN = 0.3  # what such a step must make of the residual to be taken
+_CALM = 0.3  # what a step that no energy judges must make of the residual to be taken
 _RENEWALS = 12  # iterations in which points that leave lose their cohesion at once
 _PATCHED_HALVINGS = 6
 _LONGEST_PAUSE = 7  # iterations between attempts at exact contact that failed
@@ -255,14 +255,17 @@ class Newton:
             return None
         body.add_friction_by_pressure(positions, touches, blocks)
         step = solve_near_symmetric(body.tangent(positions, blocks), self._solver, balance.unbalanced, accuracy)
-        moved = positions + step
+        return positions + step if self._calms(positions, step, balance.residual) else None
+
+    def _calms(self, positions: FloatArray, step: FloatArray, residual: float) -> bool:
+        """Whether a step brings the residual down by far; friction is as it was where it does not."""
+        body, moved = self._body, positions + step
         if not body.is_possible(moved):
-            return None
-        found = body.balance(moved, body.touches(moved))
-        if found.residual < _COUPLED_GAIN * balance.residual:
-            return moved
-        body.touches(positions)  # friction as it was
-        return None
+            return False
+        if body.balance(moved, body.touches(moved)).residual < _CALM * residual:
+            return True
+        body.touches(positions)
+        return False
 
     def _solved(
         self, positions: FloatArray, blocks: FloatArray, forces: FloatArray, accuracy: float
@@ -276,8 +279,9 @@ class Newton:
     def _search(self, positions: FloatArray, direction: _Direction, balance: Balance) -> FloatArray | None:
         """Backtrack until the energy falls enough; None where no step lowers it.
 
-        Where the organ snaps through, the stiffness that was made definite is much too stiff; there longer
-        steps are tried as long as the energy falls.
+        Where a whole step promises less than rounding makes of energies, the residual judges it. Where the organ
+        snaps through, the stiffness that was made definite is much too stiff; there longer steps are tried as long as
+        the energy falls.
         """
         body, step = self._body, direction.step
         start = body.energy(positions)
@@ -289,6 +293,8 @@ class Newton:
         for _ in range(_HALVINGS):
             reached = body.energy(positions + length * step)
             if reached <= start + _ARMIJO * length * slope + _ROUND_OFF * scale:
+                break
+            if length == 1.0 and -slope <= _ROUND_OFF * scale and self._calms(positions, step, balance.residual):
                 break
             length *= 0.5
         else:

@@ -44,6 +44,4 @@ def _bent() -> list[Check]:
     return checks
 
 
-CASES = (
-    Case(f"{_NAME}/cantilever", "slender cantilever under a dead end force, P L² / E I to 10, T10", _bent, slow=True),
-)
+CASES = (Case(f"{_NAME}/cantilever", "slender cantilever under a dead end force, P L² / E I to 10, T10", _bent),)

@@ -8,8 +8,9 @@ from scipy import ndimage
 
 from glisson.core.errors import BadInput
 from glisson.core.image import Volume
+from glisson.core.units import place_text
 from glisson.preoperative.correction.clicks import with_piece, without_piece
-from glisson.preoperative.imaging.clicked import checked_clicks, place_text
+from glisson.preoperative.imaging.clicked import checked_clicks
 from glisson.preoperative.imaging.ct import smoothed_ct
 from glisson.preoperative.imaging.working_grid import WorkingGrid
 

@@ -5,6 +5,7 @@ import numpy as np
 from glisson.core.arrays import FloatArray
 from glisson.core.errors import BadInput
 from glisson.core.image import Grid
+from glisson.core.units import place_text
 
 
 def checked_clicks(grid: Grid, points_mm: FloatArray) -> FloatArray:
@@ -18,11 +19,6 @@ def checked_clicks(grid: Grid, points_mm: FloatArray) -> FloatArray:
     if outside.any():
         raise BadInput(f"The click {place_text(points_mm[outside][0])} lies outside the scan, which {_extent(grid)}.")
     return indices
-
-
-def place_text(point_mm: FloatArray) -> str:
-    """A place for people."""
-    return "(" + ", ".join(f"{value:.0f}" for value in point_mm) + ") mm"
 
 
 def _extent(grid: Grid) -> str:

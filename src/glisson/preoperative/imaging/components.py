@@ -9,6 +9,7 @@ from scipy import ndimage
 from glisson.core.arrays import FloatArray
 from glisson.core.errors import BadInput
 from glisson.core.image import Grid
+from glisson.core.units import place_text
 
 LARGEST_CRUMB = 0.01
 """A second part above this fraction of the largest one is no crumb but a question for a person."""
@@ -24,8 +25,7 @@ class Part:
     @property
     def place(self) -> str:
         """Volume and centroid for people."""
-        where = ", ".join(f"{value:.0f}" for value in self.centroid_mm)
-        return f"{_volume_text(self.volume_ml)} at ({where}) mm"
+        return f"{_volume_text(self.volume_ml)} at {place_text(self.centroid_mm)}"
 
 
 def single_part(mask: NDArray[np.bool_], grid: Grid, what: str) -> tuple[NDArray[np.bool_], tuple[Part, ...]]:

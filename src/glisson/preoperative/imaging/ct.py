@@ -4,16 +4,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glisson.core.image import Volume
-from glisson.preoperative.imaging.diffusion import diffused
+from glisson.preoperative.imaging.diffusion import smoothed
 from glisson.preoperative.imaging.working_grid import WorkingGrid
 
 _VISIBLE_HU = (-300.0, 400.0)
 """Air and bone are cut to this range before smoothing."""
 
-_EDGE_HU = 20.0
-_STEPS = 6
-
 
 def smoothed_ct(volume: Volume, grid: WorkingGrid) -> NDArray[np.float32]:
     """Smoothed HU of a CT on the working grid (row, column, slice)."""
-    return diffused(grid.working(np.clip(volume.voxels, *_VISIBLE_HU)), grid.spacing_mm, _EDGE_HU, _STEPS)
+    return smoothed(grid.working(np.clip(volume.voxels, *_VISIBLE_HU)), grid.spacing_mm)

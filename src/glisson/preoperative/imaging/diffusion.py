@@ -6,6 +6,9 @@ from numpy.typing import NDArray
 
 from glisson.core.arrays import FloatArray
 
+_EDGE_HU = 20.0
+_STEPS = 6
+
 
 def diffused(voxels: NDArray[np.floating], spacing_mm: FloatArray, edge: float, iterations: int) -> NDArray[np.float32]:
     """Voxels [i, j, k] after some steps of ∂I/∂t = div(g ∇I), g = 1 / (1 + (ΔI / edge)²).
@@ -20,6 +23,11 @@ def diffused(voxels: NDArray[np.floating], spacing_mm: FloatArray, edge: float, 
     step = 0.9 / (2.0 * float(weights.sum()))
     result: NDArray[np.float32] = _diffused(voxels.astype(np.float32), step * weights, edge, iterations)
     return result
+
+
+def smoothed(hu: NDArray[np.floating], spacing_mm: FloatArray) -> NDArray[np.float32]:
+    """Voxels [i, j, k] on the scale of HU as segmentation looks at them: without noise, with their edges."""
+    return diffused(hu, spacing_mm, _EDGE_HU, _STEPS)
 
 
 @njit(cache=True)

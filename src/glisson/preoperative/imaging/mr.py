@@ -8,13 +8,12 @@ fat with its signal suppressed, air and bone, gets that of fat.
 from collections.abc import Sequence
 
 import numpy as np
-import SimpleITK as sitk
 from numpy.typing import NDArray
 from scipy import ndimage
 
 from glisson.core.arrays import FloatArray
 from glisson.core.image import Volume
-from glisson.preoperative.imaging.diffusion import diffused
+from glisson.preoperative.imaging.diffusion import smoothed
 from glisson.preoperative.imaging.surroundings import Index, distance_from
 from glisson.preoperative.imaging.working_grid import WorkingGrid
 
@@ -27,9 +26,6 @@ _LITTLE = 0.38
 
 _LOOK_MM = 10.0
 """The liver's signal is the median of so much about the clicks."""
-
-_EDGE_HU = 20.0
-_STEPS = 6
 
 _COARSE_MM = 8.0
 _ITERATIONS = (20, 10)
@@ -51,11 +47,13 @@ def smoothed_mr(volume: Volume, grid: WorkingGrid, clicks: Sequence[Index]) -> N
     signal = max(float(np.median(near)), 1e-6)
     values = _LIVER_HU + _HU_PER_FRACTION * (even / signal - 1.0)
     scaled = np.where(calm < _LITTLE * signal, _FAT_HU, values).astype(np.float32)
-    return diffused(scaled, grid.spacing_mm, _EDGE_HU, _STEPS)
+    return smoothed(scaled, grid.spacing_mm)
 
 
 def _without_bias(values: NDArray[np.float32], spacing_mm: FloatArray) -> NDArray[np.float32]:
     """Signal (a, b, c) over the coil's sensitivity, which is 1 on average."""
+    import SimpleITK as sitk  # slow to load, and `--help` needs this module
+
     image = sitk.GetImageFromArray(values.T)  # SimpleITK counts the slowest axis first
     image.SetSpacing(spacing_mm.tolist())
     factors = [min(max(round(_COARSE_MM / s), 1), n) for s, n in zip(spacing_mm, values.shape, strict=True)]

@@ -46,12 +46,11 @@ _RIVAL = 0.85
 class Start:
     """Where the liver seems to be.
 
-    `point_mm` is the middle of the widest ball, (3,) LPS mm, and `radius_mm` its radius; `rival_mm` (3,) is another
-    place that is almost as likely, None where there is none.
+    `point_mm` is the middle of the widest ball, (3,) LPS mm; `rival_mm` (3,) is another place that is almost as
+    likely, None where there is none.
     """
 
     point_mm: FloatArray
-    radius_mm: float
     rival_mm: FloatArray | None
 
 
@@ -82,7 +81,7 @@ def find_start(smooth: NDArray[np.float32], working: WorkingGrid, grid: Grid) ->
     around = np.sqrt(((points - points[best]) ** 2).sum(axis=-1)) < 2.0 * radius
     second, other = _widest(coarse, spacing, likely, around)
     rival = points[other] if other is not None and second > _RIVAL * radius else None
-    return Start(points[best], radius, rival)
+    return Start(points[best], rival)
 
 
 def _points(shape: tuple[int, ...], steps: NDArray[np.int_], working: WorkingGrid, grid: Grid) -> FloatArray:

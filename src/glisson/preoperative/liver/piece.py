@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from glisson.core.arrays import FloatArray
-from glisson.preoperative.imaging.surroundings import distance_from, surroundings
+from glisson.preoperative.imaging.surroundings import Index, distance_from, surroundings
 from glisson.preoperative.liver.intensity_prior import SOFT_TISSUE_HU, IntensityPrior
 from glisson.preoperative.liver.reachable import reachable_region
 
@@ -20,7 +20,7 @@ def like_piece(
     smooth: NDArray[np.float32],
     free: NDArray[np.bool_],
     spacing_mm: FloatArray,
-    place: tuple[int, int, int],
+    place: Index,
     reach_mm: float,
 ) -> NDArray[np.bool_]:
     """The piece about a place as far as its grey values go on, and its passages are wide; may be empty.

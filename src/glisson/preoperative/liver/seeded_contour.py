@@ -19,10 +19,11 @@ from glisson.core.image import Grid, LabelMap, Volume
 from glisson.core.parameters import parameter
 from glisson.core.protocols import Progress, Segmentation, silent
 from glisson.core.status import Status
+from glisson.core.units import place_text
 from glisson.preoperative.contours.localized_contour import LocalizedContourParameters
 from glisson.preoperative.imaging.axial import slice_axis
 from glisson.preoperative.imaging.borders import touched_borders
-from glisson.preoperative.imaging.clicked import checked_clicks, place_text
+from glisson.preoperative.imaging.clicked import checked_clicks
 from glisson.preoperative.imaging.ct import smoothed_ct
 from glisson.preoperative.imaging.mr import smoothed_mr
 from glisson.preoperative.imaging.working_grid import WorkingGrid
