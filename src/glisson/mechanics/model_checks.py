@@ -26,9 +26,9 @@ def _check_mesh(mesh: TetMesh) -> None:
     used[mesh.tetrahedra] = True
     loose = np.flatnonzero(~used)
     if len(loose):
+        where = place_text(mesh.nodes[loose[0]])
         raise BadInput(
-            f"{len(loose)} nodes of the mesh belong to no tetrahedron, the first at {place_text(mesh.nodes[loose[0]])}; "
-            "leave them out."
+            f"{len(loose)} nodes of the mesh belong to no tetrahedron, the first at {where}; leave them out."
         )
     twins = _twins(mesh.corners)
     if len(twins):
