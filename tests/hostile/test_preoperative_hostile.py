@@ -3,17 +3,19 @@ import pytest
 import trimesh
 
 from glisson.core import BadInput, Grid, LabelMap, Model, StageFailed, Status, TetMesh, TriangleSurface, Volume
+from glisson.core.parameters import parameters_by_kind
 from glisson.preoperative.contours.localized_contour import LocalizedContourParameters, evolve
 from glisson.preoperative.liver.label_segmenter import LabelSegmenter, LabelSegmenterParameters
 from glisson.preoperative.liver.seeded_contour import SeededContour, SeededContourParameters
 from glisson.preoperative.meshing.mmg import Mmg, MmgParameters
 from glisson.preoperative.meshing.surface import MarchingCubes, MarchingCubesParameters
 from glisson.preoperative.model.attachments import (
+    ATTACHMENT_KINDS,
     BoxAttachment,
-    attachments_from_tables,
     node_sets,
 )
-from glisson.preoperative.model.model_building import HUMAN_LIVER, ModelSettings, build_model
+from glisson.preoperative.model.material_presets import HUMAN_LIVER
+from glisson.preoperative.model.model_building import ModelSettings, build_model
 from glisson.preoperative.model.structures import build_structures
 from glisson.preoperative.scenario.manoeuvre import propose_scenario
 from preoperative_shapes import LIVER_GRID, ellipsoid, labels_of, mask_of, two_lobes
@@ -162,7 +164,7 @@ def test_a_plate_thinner_than_the_lattice_is_refused():
 class Shrinking:
     """A mesher whose mesh is 3 % too small."""
 
-    def mesh(self, surface, progress=None):
+    def mesh(self, surface, progress=None, finer=()):
         mesh = Mmg(MmgParameters(edge_length_mm=25.0, envelope_mm=0.4)).mesh(surface)
         return TetMesh(mesh.nodes * 0.99, mesh.tetrahedra)
 
@@ -204,7 +206,7 @@ def test_an_attachment_without_nodes_says_where_the_organ_is():
 )
 def test_attachment_tables_that_cannot_be_used(table, sentence):
     with pytest.raises(BadInput, match=sentence):
-        attachments_from_tables([table], "case.toml: attachments")
+        parameters_by_kind(ATTACHMENT_KINDS, [table], "direction", "case.toml: attachments")
 
 
 def test_settings_without_a_liver_and_a_model_without_a_back():

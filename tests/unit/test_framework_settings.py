@@ -11,7 +11,9 @@ from glisson.core.parameters import parameter
 from glisson.framework import settings_file
 from glisson.framework.settings import CapsuleSettings, PlaneSettings, RodSettings, SegmentSettings, Settings
 from glisson.framework.settings_file import settings_from_table, settings_text
-from glisson.preoperative.model.attachments import BoxAttachment, DirectionAttachment
+from glisson.preoperative.model.attachments import BoxAttachment, DirectionAttachment, LigamentAttachment
+from glisson.preoperative.model.material_presets import PRESETS
+from glisson.preoperative.model.refinements import BallRefinement, TumourRefinement
 from glisson.preoperative.scenario.lever_placement import LeverLiftParameters
 
 
@@ -36,7 +38,9 @@ MANY = replace(
     attachments=(
         DirectionAttachment(directions=("superior",), reach=0.2),
         BoxAttachment((0.0, -10.0, 5.0), (1.0, 2.0, 30.0), "ligament", 4.0),
+        LigamentAttachment("falciform", 0.5),
     ),
+    refinements=(TumourRefinement(4.0, 3.0), BallRefinement((1.0, 2.0, 3.0))),
     capsule=CapsuleSettings(900.0, 0.2),
     rod=RodSettings(12.5, friction=0.2),
     scenario=LeverLiftParameters(angle_deg=30.0, gas_pressure_kpa=1.6),
@@ -65,6 +69,18 @@ def test_a_change_touches_only_its_line_and_keeps_a_persons_comments() -> None:
     assert [line for line in before.splitlines() if line not in after.splitlines()] == []
 
 
+def test_a_preset_is_where_a_material_begins() -> None:
+    """Stiffnesses of the dissertation's sections 1.4 and 4.3; it cites 6 and 13 kPa and computes with 700."""
+    stiffness = {"human-liver": 7.0, "cadaver-liver": 6.0, "pig-liver": 13.0, "dissertation": 700.0}
+    assert {name: preset.material.young_modulus_kpa for name, preset in PRESETS.items()} == stiffness
+    pig = parsed("[materials.liver]\npreset = 'pig-liver'\npoisson_ratio = 0.49").materials["liver"]
+    assert (pig.young_modulus_kpa, pig.poisson_ratio, pig.density_kg_m3) == (13.0, 0.49, 1150.0)
+    text = settings_text(Settings())
+    assert parsed(text.replace('preset = "human-liver"', 'preset = "pig-liver"')).materials["liver"] == replace(
+        Settings().materials["liver"], young_modulus_kpa=13.0
+    )
+
+
 def test_another_technique_does_not_inherit_parameters() -> None:
     changed = MANY.choosing("mesh", "mmg", {})
     assert changed.choices["mesh"].parameters == {}
@@ -88,9 +104,12 @@ def test_another_technique_does_not_inherit_parameters() -> None:
         ("[materials.liver]\npoisson_ratio = 0.5", ["materials.liver", "below 0.5"]),
         ("[materials.liver]\nyoung = 3", ["materials.liver", "young"]),
         ("[materials]\nliver = 3", ["materials.liver", "table"]),
+        ("[materials.liver]\npreset = 'cow'", ["materials.liver", "pig-liver", "cow"]),
+        ("[[attachments]]\nkind = 'ligament'\nname = 'round'", ["attachments", "falciform", "round"]),
         ("attachments = 3", ["attachments", "[[attachments]]"]),
         ("[[attachments]]\nkind = 'ring'", ["attachments", "ring"]),
         ("[[attachments]]\nreech = 0.2", ["attachments", "reech"]),
+        ("[[refinements]]\nkind = 'ball'", ["refinements", "centre_mm"]),
         ("[scenario]\nangle_deg = 90", ["scenario", "angle_deg"]),
         ("seed = -1", ["seed"]),
         ("target = 2", ["target"]),

@@ -6,13 +6,14 @@ from blocks import block
 from scipy.spatial.transform import Rotation
 
 from glisson.core import BadInput, Grid, LabelMap, Material, TetMesh
+from glisson.core.parameters import parameters_by_kind
 from glisson.preoperative.liver.label_segmenter import LabelSegmenter, LabelSegmenterParameters
 from glisson.preoperative.meshing.mmg import Mmg, MmgParameters
 from glisson.preoperative.meshing.surface import MarchingCubes, MarchingCubesParameters
 from glisson.preoperative.model.attachments import (
+    ATTACHMENT_KINDS,
     BoxAttachment,
     DirectionAttachment,
-    attachments_from_tables,
     ligaments,
     node_sets,
 )
@@ -110,7 +111,7 @@ def test_attachments_from_tables():
         {"kind": "box", "name": "a", "low_mm": [0, 0, 0], "high_mm": [1, 2, 3]},
         {"name": "b", "directions": ["inferior"], "reach": 0.2},
     ]
-    first, second = attachments_from_tables(tables, "case.toml: attachments")
+    first, second = parameters_by_kind(ATTACHMENT_KINDS, tables, "direction", "case.toml: attachments")
     assert first == BoxAttachment(low_mm=(0.0, 0.0, 0.0), high_mm=(1.0, 2.0, 3.0), name="a")
     assert second == DirectionAttachment("b", ("inferior",), reach=0.2)
 

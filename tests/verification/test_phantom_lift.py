@@ -9,7 +9,8 @@ from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
 from glisson.phantom.demo import demo_phantom
 from glisson.preoperative.meshing.mmg import Mmg, MmgParameters
 from glisson.preoperative.meshing.surface import MarchingCubes, MarchingCubesParameters
-from glisson.preoperative.model.model_building import HUMAN_LIVER, ModelSettings, build_model
+from glisson.preoperative.model.material_presets import HUMAN_LIVER
+from glisson.preoperative.model.model_building import ModelSettings, build_model
 
 
 @pytest.fixture(scope="module")

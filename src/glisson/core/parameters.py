@@ -1,6 +1,6 @@
 """Parameters of techniques: frozen dataclasses from which TOML tables, CLI options and help are made."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, Field, field, fields
 from math import isfinite
 from types import UnionType
@@ -39,6 +39,23 @@ def build_parameters(kind: type[P], values: Mapping[str, Any], where: str) -> P:
     if missing:
         raise BadInput(f"{where} needs {missing}.")
     return kind(**made)
+
+
+def parameters_by_kind(
+    kinds: Mapping[str, type[P]], tables: Sequence[Mapping[str, Any]], default: str, where: str
+) -> tuple[P, ...]:
+    """Parameter dataclasses from tables whose `kind` says which class each is, `default` where it is not said.
+
+    Raises:
+        BadInput: an unknown kind, or as `build_parameters`.
+    """
+    made = []
+    for table in tables:
+        kind = table.get("kind", default)
+        if kind not in kinds:
+            raise BadInput(f"{where}: kind must be one of {sorted(kinds)}, not {kind!r}.")
+        made.append(build_parameters(kinds[kind], {k: v for k, v in table.items() if k != "kind"}, where))
+    return tuple(made)
 
 
 def _checked(item: "Field[Any]", hint: Any, value: Any, where: str) -> Any:

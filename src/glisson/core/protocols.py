@@ -6,6 +6,7 @@ lab adds its own from a package of its own. Long work calls `progress` now and t
 KeyboardInterrupt and must not be swallowed.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from glisson.core.arrays import FloatArray
 from glisson.core.deformation import Deformation
+from glisson.core.fine_zone import FineZone
 from glisson.core.image import LabelMap, Volume
 from glisson.core.mesh import TetMesh, TriangleSurface
 from glisson.core.model import Material, Model
@@ -103,8 +105,8 @@ class SurfaceExtractor(Technique, Protocol):
 class Mesher(Technique, Protocol):
     """Fills a closed surface with tetrahedra (entry-point group `glisson.meshers`)."""
 
-    def mesh(self, surface: TriangleSurface, progress: Progress = silent) -> TetMesh:
-        """T4 mesh of the inside.
+    def mesh(self, surface: TriangleSurface, progress: Progress = silent, finer: Sequence[FineZone] = ()) -> TetMesh:
+        """T4 mesh of the inside, with shorter edges in some zones.
 
         Raises:
             StageFailed: no mesh could be made.

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from glisson.core.errors import BadInput
+from glisson.core.fine_zone import FineZone
 from glisson.core.image import LabelMap
 from glisson.core.mesh import TetMesh, TriangleSurface
 from glisson.core.protocols import Progress, Segmentation, silent
@@ -72,7 +73,7 @@ class MeshStage(Stage):
     packages = ("glisson.preoperative",)
 
     def settings(self, settings: Settings) -> Mapping[str, Any]:
-        """Parameters of surface extractor and mesher, materials and attachments."""
+        """Parameters of surface extractor and mesher, refinements, materials and attachments."""
         materials = {name: asdict(material) for name, material in settings.materials.items()}
         attachments = [asdict(attachment) for attachment in settings.attachments]
         return self._tetrahedra_settings(settings) | {
@@ -103,21 +104,27 @@ class MeshStage(Stage):
             mesher = _KeptTetrahedra(read_model(case.path(MODEL)).mesh)
         extractor = settings.choices["surface"].make(SETTINGS, settings.seed)
         model_settings = ModelSettings(
-            settings.materials, settings.attachments, settings.capsule.made(), settings.rod.made()
+            settings.materials,
+            settings.attachments,
+            settings.refinements,
+            settings.capsule.made(),
+            settings.rod.made(),
         )
         model, report = build_model(organ, tumours, structures, extractor, mesher, model_settings, progress)
         write_model(out / MODEL, model)
         return _mesh_facts(report) | {"tetrahedra_from": made_from}
 
     def _tetrahedra_settings(self, settings: Settings) -> dict[str, Any]:
-        return {
+        chosen = {
             name: asdict(settings.choices[name].all_parameters(SETTINGS, settings.seed)) for name in ("surface", "mesh")
         }
+        return chosen | {"refinements": [asdict(refinement) for refinement in settings.refinements]}
 
     def _tetrahedra_basis(self, case: Case, settings: Settings) -> dict[str, Any]:
         basis = self.basis(case, settings)
         plain = {
             "organ": basis.inputs.get(ORGAN),
+            "tumours": basis.inputs.get(TUMOURS) if settings.refinements else None,
             "settings": self._tetrahedra_settings(settings),
             "techniques": basis.techniques,
             "source": basis.source,
@@ -131,7 +138,7 @@ class _KeptTetrahedra:
     def __init__(self, mesh: TetMesh) -> None:
         self._mesh = mesh
 
-    def mesh(self, surface: TriangleSurface, progress: Progress = silent) -> TetMesh:
+    def mesh(self, surface: TriangleSurface, progress: Progress = silent, finer: Sequence[FineZone] = ()) -> TetMesh:
         """The kept mesh; the surface is the one that it was made from."""
         return self._mesh
 

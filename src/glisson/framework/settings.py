@@ -13,7 +13,8 @@ from glisson.core.model import Capsule, Material, Rod
 from glisson.core.parameters import build_parameters, parameter
 from glisson.core.registry import technique_class
 from glisson.preoperative.model.attachments import DEFAULT_ATTACHMENTS, Attachment
-from glisson.preoperative.model.model_building import HUMAN_LIVER
+from glisson.preoperative.model.material_presets import HUMAN_LIVER
+from glisson.preoperative.model.refinements import Refinement
 from glisson.preoperative.model.regions import ORGAN
 from glisson.preoperative.scenario.lever_placement import LeverLiftParameters
 
@@ -141,13 +142,15 @@ class Settings:
     """Everything that `case.toml` holds.
 
     `choices` has one technique for each section of `KINDS`; `materials` is by the name of the region
-    ("liver", one tumour's name, or "tumours" for all others); `attachments` hold the organ; `target` is
-    the tumour to remove (None: the largest one); `seed` is that of every random number.
+    ("liver", one tumour's name, or "tumours" for all others); `attachments` hold the organ; in
+    `refinements` the mesh is finer; `target` is the tumour to remove (None: the largest one); `seed` is
+    that of every random number.
     """
 
     choices: Mapping[str, TechniqueChoice] = field(default_factory=dict)
     materials: Mapping[str, Material] = field(default_factory=lambda: {ORGAN: HUMAN_LIVER})
     attachments: tuple[Attachment, ...] = DEFAULT_ATTACHMENTS
+    refinements: tuple[Refinement, ...] = ()
     segment: SegmentSettings = field(default_factory=SegmentSettings)
     capsule: CapsuleSettings = field(default_factory=CapsuleSettings)
     rod: RodSettings = field(default_factory=RodSettings)

@@ -8,7 +8,7 @@ import tomlkit
 
 from glisson.core.errors import BadInput
 from glisson.core.model import Material
-from glisson.core.parameters import build_parameters, range_phrase
+from glisson.core.parameters import build_parameters, parameters_by_kind, range_phrase
 from glisson.core.registry import technique_class
 from glisson.framework.settings import (
     DEFAULT_TECHNIQUES,
@@ -19,12 +19,13 @@ from glisson.framework.settings import (
     TechniqueChoice,
 )
 from glisson.preoperative.model.attachments import (
+    ATTACHMENT_KINDS,
     DEFAULT_ATTACHMENTS,
     Attachment,
-    BoxAttachment,
-    attachments_from_tables,
 )
-from glisson.preoperative.model.model_building import HUMAN_LIVER
+from glisson.preoperative.model.ligaments import LIGAMENTS
+from glisson.preoperative.model.material_presets import HUMAN_LIVER, PRESETS
+from glisson.preoperative.model.refinements import REFINEMENT_KINDS, Refinement
 from glisson.preoperative.model.regions import ORGAN
 
 _HEAD = """\
@@ -57,7 +58,7 @@ def settings_from_table(table: Mapping[str, Any], where: str) -> Settings:
             parameters are checked when the technique is made, since that may load a plug-in.
     """
     sections = sorted({*KINDS, *SECTIONS, "materials"})
-    known = ["schema", "seed", "target", *sections, "attachments"]
+    known = ["schema", "seed", "target", *sections, "attachments", "refinements"]
     unknown = sorted(set(table) - set(known))
     if unknown:
         raise BadInput(f"{where} does not know {unknown}; it has {known}.")
@@ -71,7 +72,8 @@ def settings_from_table(table: Mapping[str, Any], where: str) -> Settings:
     choices = {name: _choice(name, given[name], where) for name in KINDS}
     own = {name: _own_section(name, given[name], where) for name in SECTIONS}
     materials, attachments = _materials(given["materials"], where), _attachments(table, where)
-    return Settings(choices, materials, attachments, target=target, seed=seed, **own)
+    refinements = _refinements(table, where)
+    return Settings(choices, materials, attachments, refinements, target=target, seed=seed, **own)
 
 
 def settings_table(settings: Settings) -> dict[str, Any]:
@@ -86,7 +88,9 @@ def settings_table(settings: Settings) -> dict[str, Any]:
         if section:
             table[name] = section
     table["materials"] = {name: asdict(material) for name, material in settings.materials.items()}
-    table["attachments"] = _attachment_tables(settings.attachments)
+    table["attachments"] = _kind_tables(settings.attachments, ATTACHMENT_KINDS)
+    if settings.refinements:
+        table["refinements"] = _kind_tables(settings.refinements, REFINEMENT_KINDS)
     return table
 
 
@@ -96,7 +100,8 @@ def settings_text(settings: Settings, previous: str | None = None) -> str:
         sections = [_section_text(settings, name) for name in _ordered_sections()]
         target = "# target =" if settings.target is None else _assignment("target", settings.target)
         head = _HEAD.format(schema=SCHEMA, seed=settings.seed, target=target)
-        return "\n".join([head, *sections, _materials_text(settings), _attachments_text(settings)])
+        held = [_materials_text(settings), _attachments_text(settings), _refinements_text(settings)]
+        return "\n".join([head, *sections, *held])
     document = tomlkit.parse(previous)
     _update(document, settings_table(settings_from_table(document.unwrap(), "case.toml")), settings_table(settings))
     return tomlkit.dumps(document)
@@ -138,27 +143,45 @@ def _materials(given: Mapping[str, Any], where: str) -> dict[str, Material]:
         if not isinstance(values, Mapping):
             raise BadInput(f"{path} must be a table, written [materials.{region}].")
         try:
-            materials[region] = build_parameters(Material, {**asdict(HUMAN_LIVER), **values}, path)
+            materials[region] = build_parameters(Material, _on_preset(values, path), path)
         except BadInput as error:
             sentence = str(error)
             raise BadInput(sentence if sentence.startswith(path) else f"{path}: {sentence}") from None
     return {ORGAN: HUMAN_LIVER} | materials
 
 
+def _on_preset(values: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """The values of a material on top of those of its preset, or of human liver."""
+    name = values.get("preset", "human-liver")
+    if not isinstance(name, str) or name not in PRESETS:
+        raise BadInput(f"{where}: preset must be one of {sorted(PRESETS)}, not {name!r}.")
+    return {**asdict(PRESETS[name].material), **{key: value for key, value in values.items() if key != "preset"}}
+
+
+def _tables(table: Mapping[str, Any], name: str, where: str) -> list[Mapping[str, Any]]:
+    given = table.get(name, [])
+    if not isinstance(given, list) or not all(isinstance(entry, Mapping) for entry in given):
+        raise BadInput(f"{where}: {name} must be a list of tables, each written [[{name}]].")
+    return given
+
+
 def _attachments(table: Mapping[str, Any], where: str) -> tuple[Attachment, ...]:
+    given = _tables(table, "attachments", where)
     if "attachments" not in table:
         return DEFAULT_ATTACHMENTS
-    given = table["attachments"]
-    if not isinstance(given, list) or not all(isinstance(entry, Mapping) for entry in given):
-        raise BadInput(f"{where}: attachments must be a list of tables, each written [[attachments]].")
-    return attachments_from_tables(given, f"{where}: attachments")
+    return parameters_by_kind(ATTACHMENT_KINDS, given, "direction", f"{where}: attachments")
 
 
-def _attachment_tables(attachments: Sequence[Attachment]) -> list[dict[str, Any]]:
+def _refinements(table: Mapping[str, Any], where: str) -> tuple[Refinement, ...]:
+    given = _tables(table, "refinements", where)
+    return parameters_by_kind(REFINEMENT_KINDS, given, "tumours", f"{where}: refinements")
+
+
+def _kind_tables(entries: Sequence[Any], kinds: Mapping[str, type[Any]]) -> list[dict[str, Any]]:
     return [
-        {"kind": "box" if isinstance(entry, BoxAttachment) else "direction"}
+        {"kind": next(kind for kind, made in kinds.items() if isinstance(entry, made))}
         | {key: _plain(value) for key, value in asdict(entry).items() if value is not None}
-        for entry in attachments
+        for entry in entries
     ]
 
 
@@ -203,21 +226,41 @@ def _explained(name: str, value: Any, about: Mapping[str, Any], is_set: bool) ->
 
 
 def _materials_text(settings: Settings) -> str:
-    about = "# Young's modulus above 0, Poisson's ratio below 0.5; laws: glisson techniques.\n"
-    tables = [
-        _table_text(f"[materials.{tomlkit.key(region).as_string()}]", asdict(material))
-        for region, material in settings.materials.items()
-    ]
-    return about + "\n".join(tables)
+    presets = "".join(f'# preset = "{name}": {preset.source}.\n' for name, preset in PRESETS.items())
+    about = (
+        "# Young's modulus above 0, Poisson's ratio below 0.5; laws: glisson techniques. A table may begin with a\n"
+        f"# preset, on which its other values are put:\n{presets}"
+    )
+    return about + "\n".join(_material_text(region, material) for region, material in settings.materials.items())
+
+
+def _material_text(region: str, material: Material) -> str:
+    """A material by its preset with the values as a comment, or in full where it is none."""
+    header, values = f"[materials.{tomlkit.key(region).as_string()}]", asdict(material)
+    preset = next((name for name, preset in PRESETS.items() if preset.material == material), None)
+    if preset is None:
+        return _table_text(header, values)
+    its_own = [f"# {_assignment(name, value)}" for name, value in values.items()]
+    return "\n".join([header, _assignment("preset", preset), *its_own]) + "\n"
 
 
 def _attachments_text(settings: Settings) -> str:
     about = (
         "# What holds the organ: surface nodes furthest along some directions (left, right, posterior, anterior,\n"
-        '# superior, inferior), or those in a box: kind = "box", low_mm = [x, y, z], high_mm = [x, y, z].\n'
+        '# superior, inferior), those in a box: kind = "box", low_mm = [x, y, z], high_mm = [x, y, z], or a ligament\n'
+        f'# where the shape suggests it: kind = "ligament", name = one of {", ".join(LIGAMENTS)}.\n'
         "# Held fast, unless stiffness_kpa_mm says with what pull per area and displacement a ligament gives way.\n"
     )
-    tables = [_table_text("[[attachments]]", table) for table in _attachment_tables(settings.attachments)]
+    tables = [_table_text("[[attachments]]", table) for table in _kind_tables(settings.attachments, ATTACHMENT_KINDS)]
+    return about + "\n".join(tables)
+
+
+def _refinements_text(settings: Settings) -> str:
+    about = (
+        "# Where tetrahedra are to be smaller: [[refinements]] with edge_length_mm, about the tumours (reach_mm from\n"
+        '# their surface), or in a ball, under a tool: kind = "ball", centre_mm = [x, y, z], radius_mm.\n'
+    )
+    tables = [_table_text("[[refinements]]", table) for table in _kind_tables(settings.refinements, REFINEMENT_KINDS)]
     return about + "\n".join(tables)
 
 

@@ -5,7 +5,8 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
 from glisson.core.arrays import FloatArray
-from glisson.navigation.rendering.bodies import Body, vertex_normals
+from glisson.geometry.normals import vertex_normals
+from glisson.navigation.rendering.bodies import Body
 
 _RAYS = 32
 _REACH_MM = 60.0

@@ -8,9 +8,10 @@ from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
 from glisson.core.arrays import FloatArray
+from glisson.geometry.normals import vertex_normals
 from glisson.navigation.rendering.ambient_light import ambient_light
 from glisson.navigation.rendering.blending import blend
-from glisson.navigation.rendering.bodies import Body, vertex_normals
+from glisson.navigation.rendering.bodies import Body
 from glisson.navigation.rendering.camera import Camera
 from glisson.navigation.rendering.shading import Floats, Hits, shade, values_at
 

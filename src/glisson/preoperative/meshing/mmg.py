@@ -9,15 +9,18 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.errors import BadInput, StageFailed
+from glisson.core.fine_zone import FineZone
 from glisson.core.mesh import TetMesh, TriangleSurface, signed_volumes
 from glisson.core.parameters import parameter
 from glisson.core.protocols import Progress, silent
@@ -68,7 +71,7 @@ class Mmg:
         """mmgpy, where it is not installed."""
         return () if find_spec("mmgpy") else ("mmgpy",)
 
-    def mesh(self, surface: TriangleSurface, progress: Progress = silent) -> TetMesh:
+    def mesh(self, surface: TriangleSurface, progress: Progress = silent, finer: Sequence[FineZone] = ()) -> TetMesh:
         """T4 mesh of the inside of a closed surface, its volume within 1 % of the surface's.
 
         Flat triangles cut the corners of a round body; the level that is meshed lies as much further out
@@ -87,7 +90,7 @@ class Mmg:
         outward_mm = 0.0
         for _ in range(_ROUNDS):
             cut = _largest_part(*inside_of_level(nodes, lattice, level - outward_mm))
-            mesh = _largest_part(*self._remeshed(cut, progress))
+            mesh = _largest_part(*self._remeshed(cut, finer, progress))
             error = mesh.volume_mm3 / surface.volume_mm3 - 1.0
             tried.append((abs(error), mesh))
             if abs(error) < _GOOD_VOLUME_ERROR:
@@ -111,15 +114,15 @@ class Mmg:
         low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
         return body_centred_lattice(low, high, self._spacing_mm)
 
-    def _remeshed(self, mesh: TetMesh, progress: Progress) -> tuple[FloatArray, IntArray]:
+    def _remeshed(self, mesh: TetMesh, finer: Sequence[FineZone], progress: Progress) -> tuple[FloatArray, IntArray]:
         with tempfile.TemporaryDirectory(prefix="glisson-mesh-") as folder:
             source, target = Path(folder) / "cut.npz", Path(folder) / "mesh.npz"
             np.savez(
                 source,
                 nodes=mesh.nodes,
                 tetrahedra=mesh.tetrahedra,
-                longest_mm=self._parameters.edge_length_mm,
-                shortest_mm=0.5 * self._spacing_mm,
+                sizes_mm=_sizes(mesh.nodes, self._parameters.edge_length_mm, finer),
+                shortest_mm=0.5 * min([self._spacing_mm, *(zone.edge_length_mm for zone in finer)]),
                 envelope_mm=self._parameters.envelope_mm,
             )
             self._wait(source, target, progress)
@@ -183,6 +186,15 @@ def _signed_distance(surface: TriangleSurface, points: FloatArray, band_mm: floa
     near = np.abs(coarse) - way < band_mm
     coarse[near] = exactly(points[near])
     return coarse
+
+
+def _sizes(nodes: FloatArray, longest_mm: float, finer: Sequence[FineZone]) -> FloatArray:
+    """Edge length (n,) aimed at near each node: the shortest of the zones that it lies in."""
+    sizes = np.full(len(nodes), longest_mm)
+    for zone in finer:
+        distance, _ = cKDTree(zone.points_mm).query(nodes)
+        sizes[distance <= zone.reach_mm] = np.minimum(sizes[distance <= zone.reach_mm], zone.edge_length_mm)
+    return sizes
 
 
 def _crash_sentence(code: int, log_path: Path) -> str:

@@ -20,6 +20,7 @@ from glisson.core.image import Grid, LabelMap
 from glisson.core.mesh import TriangleSurface
 from glisson.core.parameters import parameter
 from glisson.core.status import Status
+from glisson.geometry.normals import vertex_normals
 
 
 @dataclass(frozen=True)
@@ -115,16 +116,6 @@ def _with_volume(vertices: FloatArray, triangles: IntArray, volume_mm3: float) -
         missing = volume_mm3 - surface.volume_mm3
         if abs(missing) < 1e-9 * volume_mm3:
             break
-        normals = _vertex_normals(vertices, triangles)
+        normals = vertex_normals(vertices, triangles)
         vertices = vertices + missing / float(surface.triangle_areas_mm2.sum()) * normals
     return vertices
-
-
-def _vertex_normals(vertices: FloatArray, triangles: IntArray) -> FloatArray:
-    a, b, c = (vertices[triangles[:, n]] for n in range(3))
-    weighted = np.cross(b - a, c - a)
-    normals = np.zeros_like(vertices)
-    for corner in range(3):
-        np.add.at(normals, triangles[:, corner], weighted)
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    return normals / np.where(lengths == 0.0, 1.0, lengths)

@@ -1,4 +1,4 @@
-"""What holds the organ: named sets of surface nodes, chosen by a box or by a direction.
+"""What holds the organ: named sets of surface nodes, chosen by a box, by a direction or as one of the ligaments.
 
 The liver is held at its back, by the coronary and triangular ligaments around the bare area and by the
 inferior vena cava (dissertation, section 1.2 and stage 1 of section 4.3: "the back side of the liver");
@@ -7,7 +7,7 @@ the left lobe is free.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.errors import BadInput
 from glisson.core.mesh import TetMesh
-from glisson.core.parameters import build_parameters, parameter
+from glisson.core.parameters import parameter
+from glisson.geometry.normals import vertex_normals
+from glisson.preoperative.model.ligaments import LIGAMENTS
 
 DIRECTIONS = {
     "left": (1.0, 0.0, 0.0),
@@ -51,8 +53,8 @@ class BoxAttachment:
                 f"not {list(self.low_mm)} and {list(self.high_mm)}."
             )
 
-    def chosen(self, points_mm: FloatArray) -> NDArray[np.bool_]:
-        """Which surface points (n, 3) belong to the attachment, (n,)."""
+    def chosen(self, points_mm: FloatArray, normals: FloatArray) -> NDArray[np.bool_]:
+        """Which surface points (n, 3) belong to the attachment, (n,); normals (n, 3) point outward."""
         inside: NDArray[np.bool_] = np.all((points_mm >= self.low_mm) & (points_mm <= self.high_mm), axis=1)
         return inside
 
@@ -82,8 +84,8 @@ class DirectionAttachment:
                 f"Attachment {self.name!r} needs directions among {list(DIRECTIONS)}, not {list(self.directions)}."
             )
 
-    def chosen(self, points_mm: FloatArray) -> NDArray[np.bool_]:
-        """Which surface points (n, 3) belong to the attachment, (n,)."""
+    def chosen(self, points_mm: FloatArray, normals: FloatArray) -> NDArray[np.bool_]:
+        """Which surface points (n, 3) belong to the attachment, (n,); normals (n, 3) point outward."""
         low, extent = points_mm.min(axis=0), np.maximum(np.ptp(points_mm, axis=0), 1e-9)
         fractions = (points_mm - low) / extent
         score = np.mean([_along(fractions, direction) for direction in self.directions], axis=0)
@@ -92,27 +94,27 @@ class DirectionAttachment:
         return result
 
 
-Attachment = BoxAttachment | DirectionAttachment
+@dataclass(frozen=True)
+class LigamentAttachment:
+    """A ligament or great vessel where the organ's shape suggests it (`ligaments`)."""
+
+    name: str = parameter("coronary", "Which one; also the name of the node set.", choices=tuple(LIGAMENTS))
+    stiffness_kpa_mm: float | None = _stiffness()
+
+    def chosen(self, points_mm: FloatArray, normals: FloatArray) -> NDArray[np.bool_]:
+        """Which surface points (n, 3) belong to the attachment, (n,); normals (n, 3) point outward."""
+        return LIGAMENTS[self.name].chosen(points_mm, normals)
+
+
+Attachment = BoxAttachment | DirectionAttachment | LigamentAttachment
 
 DEFAULT_ATTACHMENTS: tuple[Attachment, ...] = (DirectionAttachment(),)
 """The superior dorsal part of the surface, right and middle, as "back"."""
 
-_KINDS: dict[str, type[Attachment]] = {"box": BoxAttachment, "direction": DirectionAttachment}
-
-
-def attachments_from_tables(tables: Sequence[Mapping[str, Any]], where: str) -> tuple[Attachment, ...]:
-    """Attachments from tables with `kind` ("box" or "direction", the default) and that kind's fields.
-
-    Raises:
-        BadInput: an unknown kind or field, a wrong type or a value outside its range.
-    """
-    made = []
-    for table in tables:
-        kind = table.get("kind", "direction")
-        if kind not in _KINDS:
-            raise BadInput(f"{where}: the kind of an attachment must be one of {sorted(_KINDS)}, not {kind!r}.")
-        made.append(build_parameters(_KINDS[kind], {k: v for k, v in table.items() if k != "kind"}, where))
-    return tuple(made)
+ATTACHMENT_KINDS: Mapping[str, type[Attachment]] = MappingProxyType(
+    {"box": BoxAttachment, "direction": DirectionAttachment, "ligament": LigamentAttachment}
+)
+"""Value of `kind` → class."""
 
 
 def node_sets(mesh: TetMesh, attachments: Sequence[Attachment]) -> dict[str, IntArray]:
@@ -124,9 +126,10 @@ def node_sets(mesh: TetMesh, attachments: Sequence[Attachment]) -> dict[str, Int
     triangles, _ = mesh.boundary()
     surface = np.unique(triangles)
     points = mesh.nodes[surface]
+    normals = vertex_normals(points, np.searchsorted(surface, triangles))
     sets: dict[str, IntArray] = {}
     for attachment in attachments:
-        nodes = surface[attachment.chosen(points)]
+        nodes = surface[attachment.chosen(points, normals)]
         if len(nodes) < 3:
             raise BadInput(f"Attachment {attachment.name!r} holds {_count(len(nodes))}; the organ {_box(points)}.")
         sets[attachment.name] = np.union1d(sets.get(attachment.name, nodes), nodes)

@@ -18,14 +18,13 @@ from glisson.preoperative.imaging.borders import touched_borders
 from glisson.preoperative.imaging.components import single_part
 from glisson.preoperative.meshing.mesh_quality import MeshQuality, mesh_quality
 from glisson.preoperative.model.attachments import DEFAULT_ATTACHMENTS, Attachment, ligaments, node_sets
+from glisson.preoperative.model.material_presets import HUMAN_LIVER
+from glisson.preoperative.model.refinements import Refinement, fine_zones
 from glisson.preoperative.model.regions import ORGAN, element_regions
 from glisson.preoperative.model.structures import build_structures
 
 LARGEST_VOLUME_ERROR = 0.01
 """A mesh whose volume differs by more than this fraction from the organ's mask is refused."""
-
-HUMAN_LIVER = Material("neo-hookean", young_modulus_kpa=7.0, poisson_ratio=0.45, density_kg_m3=1150.0)
-"""Human liver; ν and ρ of the dissertation's section 4.3, E from the elastographies that it cites."""
 
 TUMOUR_STIFFENING = 3.0
 """Stiffness of a tumour over that of the liver where no material is given.
@@ -48,6 +47,7 @@ class ModelSettings:
 
     materials: Mapping[str, Material] = field(default_factory=lambda: {ORGAN: HUMAN_LIVER})
     attachments: tuple[Attachment, ...] = DEFAULT_ATTACHMENTS
+    refinements: tuple[Refinement, ...] = ()
     capsule: Capsule | None = None
     rod: Rod | None = None
 
@@ -95,7 +95,7 @@ def build_model(
         structures: vessels, duct, wire and others by canonical names, or None.
         extractor: makes the organ's surface.
         mesher: makes the T4 mesh.
-        settings: materials and attachments.
+        settings: materials, attachments and refinements.
         progress: told how far it is.
 
     Raises:
@@ -111,7 +111,8 @@ def build_model(
     progress(0.0, "surface")
     surface = extractor.extract(whole, organ)
     progress(0.1, "tetrahedra")
-    mesh = mesher.mesh(surface, lambda _, message: progress(0.1, message))
+    zones = fine_zones(settings.refinements, tumours)
+    mesh = mesher.mesh(surface, lambda _, message: progress(0.1, message), zones)
     volume_ml = float(whole.sum()) * organ.grid.voxel_volume_mm3 * 1e-3
     _require_volume(mesh, volume_ml)
     progress(0.8, "regions and structures")
