@@ -65,7 +65,7 @@ def read_dicom_segmentation(path: Path) -> tuple[LabelMap, ...]:
         return tuple(LabelMap(voxels, grid, table) for voxels, table in layers)
 
 
-def write_dicom_segmentation(path: Path, maps: Sequence[LabelMap], scan: Path) -> None:
+def write_dicom_segmentation(path: Path, maps: Sequence[LabelMap], scan: Path, series_uid: str | None = None) -> None:
     """Write label maps as one binary DICOM segmentation of the series that they were made of; atomic.
 
     Patient and study are those of the series, since a segmentation belongs into the same record; where the patient's
@@ -75,13 +75,14 @@ def write_dicom_segmentation(path: Path, maps: Sequence[LabelMap], scan: Path) -
         path: the file to make.
         maps: label maps on the grid of the scan, whatever the order and sense of its axes; they may overlap.
         scan: the DICOM folder of the scan.
+        series_uid: which series, where the folder holds several.
 
     Raises:
         BadInput: no label, not the scan of these labels, or the place cannot be written.
         WriteFailed: the disk is full.
     """
     with decoding(scan, "a DICOM folder"), quiet():
-        slices, grid = series_slices(scan)
+        slices, grid = series_slices(scan, series_uid)
         placed = [on_grid_of(grid, labels, "the segmentation") for labels in maps]
         named = [(labels.mask(name), name) for labels in placed for name in labels.names.values()]
         named = [(mask, name) for mask, name in named if mask.any()]
