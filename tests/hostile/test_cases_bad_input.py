@@ -1,5 +1,6 @@
 """The bad inputs of the issue through the commands: an exit code, one sentence, and the case as it was."""
 
+import html
 import json
 import shutil
 from collections.abc import Callable
@@ -8,12 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pydicom.uid import generate_uid
 
 from dicom_samples import stored_values, write_series
 from glisson.cli.main import main
 from glisson.core.image import Grid, LabelMap, Volume
-from glisson.framework.case import ORGAN, SCAN, SCENARIO, SETTINGS
+from glisson.framework.case import ORGAN, REPORT, SCAN, SCENARIO, SETTINGS
+from glisson.framework.settings_file import settings_text
 from glisson.io.images import read_volume, write_labels, write_volume
+from glisson.preoperative.imaging.scan_checks import scan_warnings
 from small_case import GRID, contents, images, make_small_case, offer_bending, small_settings
 
 Refused = Callable[..., str]
@@ -66,10 +70,98 @@ def test_two_series_mixed(tmp_path: Path, refused: Refused) -> None:
     assert "2 series" in refused(tmp_path, 2, *new(tmp_path, tmp_path / "scan"))
 
 
+def test_one_of_two_series_is_chosen(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    wanted = generate_uid()
+    write_series(tmp_path / "scan", stored_values(8), SeriesInstanceUID=wanted)
+    write_series(tmp_path / "scan", stored_values(2), prefix="b")
+    assert main(list(map(str, (*new(tmp_path, tmp_path / "scan"), "--series", wanted)))) == 0
+    assert read_volume(tmp_path / "case" / SCAN).grid.shape[2] == 8
+
+
 def test_a_missing_slice(tmp_path: Path, refused: Refused) -> None:
     paths = write_series(tmp_path / "scan", stored_values(8))
     paths[4].unlink()
     assert "slice" in refused(tmp_path, 2, *new(tmp_path, tmp_path / "scan"))
+
+
+def body() -> np.ndarray:
+    """Stored values (slices, rows, columns) of HU + 1024: soft tissue with fat about it, in air."""
+    y, x = np.mgrid[-1:1:40j, -1:1:36j]
+    distance = np.hypot(x, y)
+    values = np.select([distance < 0.6, distance < 0.8], [60, -95], -1000) + 1024
+    return np.repeat(values[None], 8, axis=0).astype(np.uint16)
+
+
+@pytest.mark.parametrize(
+    ("values", "tags", "words"),
+    [
+        (body(), {"RescaleIntercept": 0}, "about 1000 too high, as in images that were never rescaled"),
+        (body() - 24, {"RescaleIntercept": 0}, "about 1000 too high"),
+        (body(), {"RescaleIntercept": -2048}, "rescaled twice"),
+        (body(), {"RescaleSlope": 8, "RescaleIntercept": 5000}, "only 0.0 % lie where fat and soft tissue do"),
+        (np.clip(body() // 4, 200, 290) - 200, {"RescaleIntercept": 0}, "windowed or normalised"),
+        (body() // 1000, {"RescaleIntercept": 0}, "windowed or normalised"),
+    ],
+    ids=["never", "never, with another offset", "twice", "wildly", "windowed", "normalised"],
+)
+def test_values_that_are_no_hu(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], values: np.ndarray, tags: dict[str, Any], words: str
+) -> None:
+    """Told when the case is made, and refused where HU are needed."""
+    write_series(tmp_path / "scan", values, **tags)
+    assert main([*map(str, new(tmp_path, tmp_path / "scan")), "--json"]) == 0
+    [warning] = json.loads(capfd.readouterr().out)["warnings"]
+    assert words in warning
+    before = contents(tmp_path / "case")
+    assert main(["segment", str(tmp_path / "case"), "--json"]) == 2
+    assert words in json.loads(capfd.readouterr().out)["message"]
+    assert contents(tmp_path / "case") == before
+
+
+def test_hu_are_not_complained_of(tmp_path: Path) -> None:
+    for tags in ({}, {"RescaleSlope": 1, "RescaleIntercept": -1000}):
+        write_series(tmp_path / "scan", body(), **tags)
+        assert scan_warnings(read_volume(tmp_path / "scan")) == ()
+        shutil.rmtree(tmp_path / "scan")
+    padded = body()
+    padded[:, :4] = padded[:, -4:] = 0
+    write_series(tmp_path / "scan", padded)
+    assert scan_warnings(read_volume(tmp_path / "scan")) == ()
+    inside = np.random.default_rng(0).normal(110.0, 12.0, (20, 20, 20)).astype(np.int16)
+    assert scan_warnings(Volume(inside, Grid(inside.shape, np.ones(3), np.zeros(3)))) == ()
+
+
+def test_thick_slices_and_a_liver_cut_by_the_scan(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Both are told by every command that looks, for machines too, and on top of the report."""
+    offer_bending(monkeypatch)
+    volume, groups = images()
+    grid = Grid((64, 36, 10), [3.0, 3.0, 10.0], GRID.origin_mm + np.array([0.0, 0.0, 3.0]))
+    part = (slice(None), slice(None), slice(1, 31, 3))
+    liver = LabelMap(groups["organ"].voxels[part], grid, {1: "liver"})
+    write_volume(tmp_path / "scan.nii.gz", Volume(volume.voxels[part], grid))
+    write_labels(tmp_path / "liver.nii.gz", liver)
+    words = new(tmp_path, tmp_path / "scan.nii.gz", "--labels", tmp_path / "liver.nii.gz")
+    thick, cut = "The slices lie 10 mm apart", "touches the scan's last layer along axis k"
+
+    def said(*words: Any) -> dict[str, Any]:
+        assert main([*map(str, words), "--json"]) == 0
+        out, err = capfd.readouterr()
+        assert thick in err
+        values: dict[str, Any] = json.loads(out)
+        return values
+
+    assert [thick in warning for warning in said(*words)["warnings"]] == [True]
+    case = tmp_path / "case"
+    (case / SETTINGS).write_text(settings_text(small_settings()))
+    warnings = said("segment", case)["warnings"]
+    assert any(thick in warning and "up to 5 mm" in warning for warning in warnings)
+    assert any(cut in warning for warning in warnings)
+    notes = said("run", case)["notes"]
+    assert warnings == notes[: len(warnings)]
+    page = html.unescape((case / REPORT).read_text())
+    assert all(warning in page for warning in warnings)
 
 
 def test_a_label_map_on_another_grid(tmp_path: Path, refused: Refused) -> None:

@@ -95,6 +95,9 @@ def test_an_mr_needs_a_click_and_a_click_something_like_a_liver():
     segmenter = SeededContour(SeededContourParameters())
     with pytest.raises(BadInput, match="In an MR the liver is not found without a click"):
         segmenter.segment(volume_on(GRID, "MR"), None, NO_SEED)
+    signal = np.where(mask_of(ellipsoid((0, 0, 0), (30, 30, 30)), GRID), 400.0, 8.0).astype(np.float32)
+    with pytest.raises(BadInput, match="A click lies in air: the signal there is 2 % of the body's"):
+        segmenter.segment(Volume(signal, GRID, "MR"), None, np.full((1, 3), -37.0))
     small = np.full(GRID.shape, -90, dtype=np.int16)
     small[17:23, 17:23, 17:23] = 100
     with pytest.raises(StageFailed, match="ml of like tissue hang together"):

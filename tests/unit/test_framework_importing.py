@@ -106,9 +106,9 @@ def test_text_that_is_drawn_into_the_pixels_is_told(tmp_path: Path) -> None:
     values = stored_values()
     values[:, :4, :] = 0
     write_series(tmp_path / "plain", values)
-    assert import_case(tmp_path / "a", tmp_path / "plain").warning is None
+    assert import_case(tmp_path / "a", tmp_path / "plain").warnings == ()
     write_series(tmp_path / "said", values, BurnedInAnnotation="YES")
-    assert "headers say" in str(import_case(tmp_path / "b", tmp_path / "said").warning)
+    assert "headers say" in str(import_case(tmp_path / "b", tmp_path / "said").warnings)
     values[:, 20:24, 10:20] = 4000
     write_series(tmp_path / "seen", values)
-    assert "40 pixels are the same in all slices" in str(import_case(tmp_path / "c", tmp_path / "seen").warning)
+    assert "40 pixels are the same in all slices" in str(import_case(tmp_path / "c", tmp_path / "seen").warnings)

@@ -183,6 +183,48 @@ def test_pydicom_reads_what_we_write(tmp_path, scan_folder):
     assert seen == sum(int(mask.sum()) for mask in wanted.values())
 
 
+def test_dicom_segmentation_of_an_oblique_scan(tmp_path, scan_folder):
+    """Empty frames between and about: each voxel lies where pydicom says that its frame does, and all come back."""
+    grid = oblique_grid()
+    rotation = grid.direction * [1.0, 1.0, np.linalg.det(grid.direction)]  # images have a right-handed frame
+    for path in scan_folder.iterdir():
+        image = pydicom.dcmread(path)
+        k = round((image.ImagePositionPatient[2] + 40.0) / 2.5)
+        image.ImageOrientationPatient = [f"{x:.12g}" for x in rotation[:, :2].T.ravel()]
+        image.ImagePositionPatient = [f"{x:.12g}" for x in rotation @ [0.0, 0.0, 2.5 * k] + [-110.25, 33.5, 812.125]]
+        image.save_as(path)
+    scan = read_dicom_folder(scan_folder).grid
+    voxels = np.zeros(scan.shape, np.uint8)
+    voxels[3:9, 4:20, 2:4], voxels[20:30, 4:9, 3], voxels[5:12, 30:38, 8:10] = 1, 2, 1
+    labels = LabelMap(voxels, scan, {1: "liver", 2: "gallbladder"})
+    write_segments(tmp_path / "a.dcm", [labels], scan_folder)
+    back = [on_grid_of(scan, part, "it") for part in read_label_maps(tmp_path / "a.dcm")]
+    assert all(np.array_equal(mask, labels.mask(name)) for name, mask in masks(back).items())
+    assert set(masks(back)) == {"liver", "gallbladder"}
+    dataset = pydicom.dcmread(tmp_path / "a.dcm")
+    shared = dataset.SharedFunctionalGroupsSequence[0]
+    axes = np.reshape(shared.PlaneOrientationSequence[0].ImageOrientationPatient, (2, 3))
+    between_rows, between_columns = shared.PixelMeasuresSequence[0].PixelSpacing
+    found = []
+    for group, frame in zip(dataset.PerFrameFunctionalGroupsSequence, dataset.pixel_array, strict=True):
+        rows, columns = np.nonzero(frame)
+        steps = np.stack([columns * between_columns, rows * between_rows], axis=1)
+        found.append(np.array(group.PlanePositionSequence[0].ImagePositionPatient, float) + steps @ axes)
+    wanted = scan.points_from_indices(np.argwhere(voxels))
+    order = [np.lexsort(np.round(points, 2).T) for points in (wanted, np.concatenate(found))]
+    assert np.abs(wanted[order[0]] - np.concatenate(found)[order[1]]).max() < 1e-3
+
+
+def test_one_of_several_series_is_referred_to(tmp_path, scan_folder):
+    grid = read_dicom_folder(scan_folder).grid
+    wanted = pydicom.dcmread(next(scan_folder.iterdir())).SeriesInstanceUID
+    write_series(scan_folder, np.zeros((3, 40, 36), np.uint16), prefix="other")
+    with pytest.raises(BadInput, match="mixes 2 series; choose one"):
+        write_segments(tmp_path / "a.dcm", overlapping_maps(grid), scan_folder)
+    write_segments(tmp_path / "a.dcm", overlapping_maps(grid), scan_folder, wanted)
+    assert pydicom.dcmread(tmp_path / "a.dcm").ReferencedSeriesSequence[0].SeriesInstanceUID == wanted
+
+
 def test_codes_are_those_of_the_standard():
     """pydicom has DICOM's own tables of SNOMED codes."""
     listed = [code.value for code in (getattr(codes.SCT, name) for name in codes.SCT.dir())]

@@ -18,10 +18,11 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FOLDER",
         help="the DICOM folder that the case was made of, for .dcm: patient and study are taken from there",
     )
+    parser.add_argument("--series", metavar="UID", help="which series, where that folder holds several")
 
 
 def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
-    names = export_labels(open_case(arguments.case), arguments.file, arguments.scan)
+    names = export_labels(open_case(arguments.case), arguments.file, arguments.scan, arguments.series)
     return Answer(
         {"file": arguments.file, "labels": names}, f"file      {arguments.file}\nlabels    {', '.join(names)}"
     )

@@ -34,6 +34,7 @@ COMMANDS = {
     "report": "write the report (runs the stages before it where they are out of date)",
     "run": "bring a case up to date, from the scan to the report",
     "export": "write the labels of a case as one segmentation for other programs (3D Slicer, DICOM)",
+    "deidentify": "copy DICOM files without what tells who the patient is (the standard's basic profile)",
     "benchmark": "measure Glisson beside other engines (in a checkout; make bench installs them)",
     "study": "compute many points, each once, and tell what they say together",
     "verify": "compare the tissue mechanics with closed forms, published figures and another engine",

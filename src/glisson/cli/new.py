@@ -11,6 +11,7 @@ from glisson.framework.importing import import_case
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("case", metavar="CASE", help="the case folder to make")
     parser.add_argument("--ct", metavar="PATH", required=True, help="the scan: a DICOM folder, NIfTI or NRRD file")
+    parser.add_argument("--series", metavar="UID", help="which series, where the DICOM folder holds several")
     parser.add_argument(
         "--labels",
         metavar="PATH",
@@ -27,14 +28,13 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
-    made = import_case(arguments.case, arguments.ct, arguments.labels, arguments.label_scheme)
+    made = import_case(arguments.case, arguments.ct, arguments.labels, arguments.label_scheme, series=arguments.series)
     text = f"case      {made.case.folder}\nlabels    {', '.join(made.labels) or 'none'}"
     if made.left_out:
         text += f"\nleft out  {made.left_out} labels of unknown names"
-    if made.warning:
-        text += f"\nwarning   {made.warning}"
+    text += "".join(f"\nwarning   {warning}" for warning in made.warnings)
     values = {
-        "case": str(made.case.folder), "labels": made.labels, "left_out": made.left_out, "warning": made.warning
+        "case": str(made.case.folder), "labels": made.labels, "left_out": made.left_out, "warnings": made.warnings
     }  # fmt: skip
     return Answer(values, text)
 

@@ -9,6 +9,7 @@ from glisson.cli.options import add_seed_points
 from glisson.cli.progress import StageLines
 from glisson.cli.running import add_run_arguments, run_to
 from glisson.framework.case import open_case
+from glisson.framework.case_warnings import case_warnings
 from glisson.framework.comparing import compare_with_reference, given_mask_facts
 
 
@@ -24,8 +25,11 @@ def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
     says_how = any(value is not None for name, value in vars(arguments).items() if name.startswith("segment."))
     result = run_to("segment", arguments, lines, replace=says_how or arguments.seed_point is not None)
     facts = result.facts.get("segment") or given_mask_facts(open_case(arguments.case))
+    warnings = case_warnings(open_case(arguments.case))
     values = {"volume_ml": facts["volume_ml"], "flagged_slices": facts["flagged_slices"], "flags": facts["flags"]}
+    values["warnings"] = warnings
     text = [f"liver     {facts['volume_ml']:.0f} ml"]
+    text += [f"warning   {warning}" for warning in warnings]
     text += [f"look at   slice {number}: {reason}" for number, reason in facts["flags"]]
     if arguments.reference is not None:
         scores = compare_with_reference(open_case(arguments.case), arguments.reference)

@@ -17,6 +17,7 @@ from glisson.io.images import read_label_maps, read_volume, write_labels, write_
 from glisson.io.label_groups import group_labels, on_grid_of
 from glisson.io.label_names import canonical_name, is_canonical
 from glisson.io.totalsegmentator import class_names
+from glisson.preoperative.imaging.scan_checks import scan_warnings
 
 GROUP_FILES = {"organ": ORGAN, "tumours": TUMOURS, "structures": STRUCTURES}
 """Label group → its file in the case folder."""
@@ -26,15 +27,15 @@ _ALSO_KNOWN = {"bone", "skin"}
 
 @dataclass(frozen=True)
 class Imported:
-    """A new case, the label names it has, how many labels were left out for their unknown names, and a warning.
+    """A new case, the label names it has, how many labels were left out for their unknown names, and warnings.
 
-    `warning` is a sentence where text that may tell who the patient is seems to be drawn into the pixels.
+    `warnings` are sentences: on text that seems to be drawn into the pixels, and on what makes the scan less useful.
     """
 
     case: Case
     labels: tuple[str, ...]
     left_out: int
-    warning: str | None
+    warnings: tuple[str, ...]
 
 
 def import_case(
@@ -43,6 +44,7 @@ def import_case(
     labels: Sequence[str | Path] = (),
     scheme: str | None = None,
     settings: Settings | None = None,
+    series: str | None = None,
 ) -> Imported:
     """Make a case folder from a scan and label maps.
 
@@ -53,12 +55,13 @@ def import_case(
             a folder of DICOM mask folders as of IRCAD.
         scheme: how label files without names are numbered ("totalsegmentator").
         settings: those of the case; the segmenter becomes "labels" where the liver is among the labels.
+        series: which series of a DICOM folder (its UID), where it holds several.
 
     Raises:
         BadInput: something cannot be read, lies on another grid, or a label map has no known name.
         WriteFailed: the disk is full.
     """
-    volume = read_volume(scan)
+    volume = read_volume(scan, series)
     known, left_out = _known_labels(labels, scheme, volume)
     groups = group_labels(known)
     used = settings or Settings()
@@ -67,7 +70,9 @@ def import_case(
     with new_case(folder, used) as making:
         write_images(making, volume, groups)
     names = tuple(name for group in groups.values() for name in group.names.values())
-    return Imported(open_case(folder), names, left_out, burned_in_text(scan, volume))
+    text = burned_in_text(scan, volume)
+    warnings = (*(() if text is None else (text,)), *scan_warnings(volume))
+    return Imported(open_case(folder), names, left_out, warnings)
 
 
 def write_images(folder: Path, volume: Volume, groups: Mapping[str, LabelMap]) -> None:

@@ -27,6 +27,7 @@ from glisson.framework.case import (
     TUMOURS,
     Case,
 )
+from glisson.framework.case_warnings import case_warnings
 from glisson.framework.pipeline import Pipeline
 from glisson.framework.preoperative_stages import MeshStage, ScenarioStage, SegmentStage, labels_of
 from glisson.framework.provenance import StageRecord, read_record
@@ -93,9 +94,9 @@ class NavigateStage(Stage):
     """What the surgeon is told."""
 
     name = "navigate"
-    inputs = (ORGAN, MODEL, *DEFORMATION, TRUTH)
+    inputs = (SCAN, ORGAN, MODEL, *DEFORMATION, TRUTH)
     outputs = (GUIDANCE, PARTS)
-    packages = ("glisson.navigation",)
+    packages = ("glisson.navigation", "glisson.preoperative.imaging")
 
     def settings(self, settings: Settings) -> Mapping[str, Any]:
         """Target and plane."""
@@ -104,7 +105,8 @@ class NavigateStage(Stage):
     def run(self, case: Case, settings: Settings, out: Path, progress: Progress) -> Mapping[str, Any]:
         """Navigate; facts: the whole of `results.json`."""
         deformation = read_deformation(case.path(RESULTS))
-        guidance = navigate(read_model(case.path(MODEL)), deformation, plan_of(settings), _truth(case))
+        model, truth = read_model(case.path(MODEL)), _truth(case)
+        guidance = navigate(model, deformation, plan_of(settings), truth, case_warnings(case))
         seconds = {name: record.seconds for name, record in _records(case).items() if name in _BEFORE_NAVIGATE}
         results = as_results(guidance, deformation, seconds)
         planned = guidance.carried or guidance.rule
@@ -120,7 +122,7 @@ class ReportStage(Stage):
     name = "report"
     inputs = (SCAN, ORGAN, TUMOURS, STRUCTURES, MODEL, SCENARIO, *DEFORMATION, GUIDANCE, TRUTH)
     outputs = (REPORT,)
-    packages = ("glisson.navigation",)
+    packages = ("glisson.navigation", "glisson.preoperative.imaging")
 
     def settings(self, settings: Settings) -> Mapping[str, Any]:
         """Target and plane."""
@@ -145,7 +147,7 @@ def report_inputs(case: Case, settings: Settings) -> ReportInputs:
         model=model,
         scenario=read_scenario(case.path(SCENARIO)),
         deformation=deformation,
-        guidance=navigate(model, deformation, plan, truth),
+        guidance=navigate(model, deformation, plan, truth, case_warnings(case)),
         plan=plan,
         volume=read_volume(case.path(SCAN)),
         organ=labels_of(case, ORGAN),

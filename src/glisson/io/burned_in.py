@@ -19,7 +19,7 @@ _ABOVE_LEAST = 100
 """What is constant is text where it is so much brighter than the padding about a round field of view."""
 
 
-def burned_in_text(scan: str | Path, volume: Volume) -> str | None:
+def burned_in_text(scan: str | Path, volume: Volume | None) -> str | None:
     """A sentence where text seems to be drawn into the pixels, None where nothing speaks for it.
 
     Headers of DICOM may say so (BurnedInAnnotation, PS3.3 C.7.6.1.1.5). Pixels do where they have the same value in
@@ -27,7 +27,7 @@ def burned_in_text(scan: str | Path, volume: Volume) -> str | None:
 
     Args:
         scan: the file or folder that was read.
-        volume: what was read from it.
+        volume: what was read from it, None where its headers alone can be.
     """
     look = "look at the images before you hand the case on."
     folder = Path(scan)
@@ -35,7 +35,7 @@ def burned_in_text(scan: str | Path, volume: Volume) -> str | None:
         with quiet():
             if any(file.has_burned_in_text for file in image_files(folder)):
                 return f"The scan's headers say that text is drawn into its pixels: {look}"
-    pixels = _constant_pixels(volume)
+    pixels = 0 if volume is None else _constant_pixels(volume)
     if pixels >= _FEWEST_PIXELS:
         return f"{pixels} pixels are the same in all slices, as text that was drawn into them would be: {look}"
     return None

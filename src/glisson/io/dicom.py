@@ -54,13 +54,17 @@ def read_dicom_mask(folder: Path) -> StoredImage:
         return StoredImage(in_c_order(voxels.T), grid)
 
 
-def series_slices(folder: Path) -> tuple[list[Slice], Grid]:
-    """The slices of the one series in a folder in the order of their places, and the grid that they make.
+def series_slices(folder: Path, series_uid: str | None = None) -> tuple[list[Slice], Grid]:
+    """The slices of a series in a folder in the order of their places, and the grid that they make.
+
+    Args:
+        folder: its images lie directly in it.
+        series_uid: which series, where there are several.
 
     Raises:
         BadInput: as for `read_dicom_folder`.
     """
-    return _checked_slices(_one_series(folder, None), needs_rescale=False)
+    return _checked_slices(_one_series(folder, series_uid), needs_rescale=False)
 
 
 def first_image(folder: Path) -> Path | None:

@@ -17,6 +17,7 @@ from pydicom.uid import SegmentationStorage, generate_uid
 import glisson
 from glisson.core import BadInput, Grid, LabelMap
 from glisson.io.atomic import atomic_path
+from glisson.io.confidentiality_profile import apply_profile
 from glisson.io.decoding import check_image_size, decoding
 from glisson.io.dicom import quiet, series_slices
 from glisson.io.dicom_headers import Slice, read_header
@@ -32,14 +33,15 @@ _MAY_BE_EMPTY = (
 )
 _ALGORITHM = StructureCode("123111", "DCM", "Deformable Models")
 _LABEL_MAP_STORAGE = "1.2.840.10008.5.1.4.1.1.66.7"  # younger than pydicom's table
-_STORAGES = (SegmentationStorage, _LABEL_MAP_STORAGE)
+SEGMENTATION_STORAGES = (SegmentationStorage, _LABEL_MAP_STORAGE)
+"""SOP classes of segmentations."""
 
 
 def is_dicom_segmentation(path: Path) -> bool:
     """Whether a file is a DICOM segmentation."""
     with quiet():
         header = read_header(path) if path.is_file() else None
-    return header is not None and header.get("SOPClassUID") in _STORAGES
+    return header is not None and header.get("SOPClassUID") in SEGMENTATION_STORAGES
 
 
 def read_dicom_segmentation(path: Path) -> tuple[LabelMap, ...]:
@@ -63,23 +65,24 @@ def read_dicom_segmentation(path: Path) -> tuple[LabelMap, ...]:
         return tuple(LabelMap(voxels, grid, table) for voxels, table in layers)
 
 
-def write_dicom_segmentation(path: Path, maps: Sequence[LabelMap], scan: Path) -> None:
+def write_dicom_segmentation(path: Path, maps: Sequence[LabelMap], scan: Path, series_uid: str | None = None) -> None:
     """Write label maps as one binary DICOM segmentation of the series that they were made of; atomic.
 
-    Patient and study are those of the series, since a segmentation belongs into the same record. Frames without a
-    voxel are left out.
+    Patient and study are those of the series, since a segmentation belongs into the same record; where the patient's
+    identity was removed from the series, the segmentation tells no more than that. Frames without a voxel are left out.
 
     Args:
         path: the file to make.
         maps: label maps on the grid of the scan, whatever the order and sense of its axes; they may overlap.
         scan: the DICOM folder of the scan.
+        series_uid: which series, where the folder holds several.
 
     Raises:
         BadInput: no label, not the scan of these labels, or the place cannot be written.
         WriteFailed: the disk is full.
     """
     with decoding(scan, "a DICOM folder"), quiet():
-        slices, grid = series_slices(scan)
+        slices, grid = series_slices(scan, series_uid)
         placed = [on_grid_of(grid, labels, "the segmentation") for labels in maps]
         named = [(labels.mask(name), name) for labels in placed for name in labels.names.values()]
         named = [(mask, name) for mask, name in named if mask.any()]
@@ -91,6 +94,9 @@ def write_dicom_segmentation(path: Path, maps: Sequence[LabelMap], scan: Path) -
         made = _segmentation(
             _sources(slices[first:last], float(grid.spacing_mm[2])), pixels, [name for _, name in named]
         )
+        if made.get("PatientIdentityRemoved") == "YES":
+            apply_profile(made)
+            made.file_meta.MediaStorageSOPInstanceUID = made.SOPInstanceUID
     with atomic_path(path) as temporary:
         made.save_as(temporary)
 

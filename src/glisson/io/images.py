@@ -111,13 +111,16 @@ def _named_labels(path: Path, image: StoredImage, scheme: str | None, names: Map
         return LabelMap(voxels, image.grid, _label_names(path, image, voxels, scheme, names))
 
 
-def write_segments(path: str | Path, maps: Sequence[LabelMap], scan: str | Path | None = None) -> None:
+def write_segments(
+    path: str | Path, maps: Sequence[LabelMap], scan: str | Path | None = None, series_uid: str | None = None
+) -> None:
     """Write label maps that may overlap as one segmentation for other programs: `.seg.nrrd` or DICOM (`.dcm`); atomic.
 
     Args:
         path: the file to make.
         maps: label maps on one grid.
         scan: the DICOM folder of the scan, which a DICOM segmentation refers to.
+        series_uid: which series, where that folder holds several.
 
     Raises:
         BadInput: the suffix is none of these, the scan is missing or another one, or the place cannot be written.
@@ -129,7 +132,7 @@ def write_segments(path: str | Path, maps: Sequence[LabelMap], scan: str | Path 
     elif target.name.lower().endswith(".dcm"):
         if scan is None:
             raise BadInput(f"{path}: a DICOM segmentation refers to the images of its scan; give their DICOM folder.")
-        write_dicom_segmentation(target, maps, Path(scan))
+        write_dicom_segmentation(target, maps, Path(scan), series_uid)
     else:
         raise BadInput(f"{path}: segmentations are written as .seg.nrrd or .dcm.")
 

@@ -1,5 +1,7 @@
 """Navigation: from a deformation (and, where known, the truth) to what the surgeon is told."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from glisson.core.arrays import FloatArray
@@ -24,20 +26,23 @@ from glisson.navigation.survey import PlanInA, Survey, read_plan, survey
 from glisson.navigation.vessels import crossed_vessels
 
 
-def navigate(model: Model, deformation: Deformation, plan: Plan, truth: Deformation | None = None) -> Guidance:
+def navigate(
+    model: Model, deformation: Deformation, plan: Plan, truth: Deformation | None = None, warnings: Sequence[str] = ()
+) -> Guidance:
     """Everything that is told of a deformation of the model's scanned shape A.
 
     `truth` is another deformation of the same A, on a mesh of its own; where it is given (and converged)
     tumours and planes carry their errors: of centroids in mm, of normals in degrees, of the planes' offset
     at the true tumour centroid along the true normal in mm, of the removed part in percentage points
     (all without sign). The guidance carries the deformation's status: unless it is good, the numbers come
-    from an unfinished last stage and must not be used.
+    from an unfinished last stage and must not be used. `warnings`, sentences on what the model was made of, come
+    first among its notes.
 
     Raises:
         BadInput: the plan names a tumour that the model does not have, or its plane misses the liver.
     """
     in_a = read_plan(model.structures, plan)
-    notes = list(in_a.notes)
+    notes = [*warnings, *in_a.notes]
     if not deformation.stages:
         notes.append("The solve ended before its first stage did, so nothing is known of the deformed liver.")
         return _nothing(deformation.status, in_a, notes)

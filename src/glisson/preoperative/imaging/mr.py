@@ -10,8 +10,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from skimage.filters import threshold_otsu
 
 from glisson.core.arrays import FloatArray
+from glisson.core.errors import BadInput
 from glisson.core.image import Volume
 from glisson.preoperative.imaging.diffusion import smoothed
 from glisson.preoperative.imaging.surroundings import Index, distance_from
@@ -23,6 +25,9 @@ _HU_PER_FRACTION = 130.0
 
 _LITTLE = 0.38
 """Signal below this fraction of the liver's is none of a soft organ."""
+
+_AIR = 0.15
+"""Signal below this fraction of the body's median is noise; no sequence shows a liver so dark without iron in it."""
 
 _LOOK_MM = 10.0
 """The liver's signal is the median of so much about the clicks."""
@@ -40,14 +45,29 @@ def smoothed_mr(volume: Volume, grid: WorkingGrid, clicks: Sequence[Index]) -> N
         volume: an MR.
         grid: the working grid.
         clicks: working voxels inside the liver, at least one.
+
+    Raises:
+        BadInput: a click lies in air.
     """
     even = _without_bias(grid.working(volume.voxels), grid.spacing_mm)
     calm = ndimage.gaussian_filter(even, 1.5 / grid.spacing_mm)
-    near = np.concatenate([calm[distance_from(click, calm.shape, grid.spacing_mm) <= _LOOK_MM] for click in clicks])
-    signal = max(float(np.median(near)), 1e-6)
+    near = [calm[distance_from(click, calm.shape, grid.spacing_mm) <= _LOOK_MM] for click in clicks]
+    _refuse_air(near, calm)
+    signal = max(float(np.median(np.concatenate(near))), 1e-6)
     values = _LIVER_HU + _HU_PER_FRACTION * (even / signal - 1.0)
     scaled = np.where(calm < _LITTLE * signal, _FAT_HU, values).astype(np.float32)
     return smoothed(scaled, grid.spacing_mm)
+
+
+def _refuse_air(near: Sequence[NDArray[np.float32]], calm: NDArray[np.float32]) -> None:
+    """Refuse clicks whose surroundings have hardly any of the body's signal."""
+    body = float(np.median(calm[calm >= threshold_otsu(calm)]))
+    for values in near:
+        if (signal := float(np.median(values))) <= _AIR * body:
+            raise BadInput(
+                f"A click lies in air: the signal there is {100.0 * signal / max(body, 1e-6):.0f} % of the body's; "
+                "click inside the liver."
+            )
 
 
 def _without_bias(values: NDArray[np.float32], spacing_mm: FloatArray) -> NDArray[np.float32]:

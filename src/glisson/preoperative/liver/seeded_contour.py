@@ -87,7 +87,8 @@ class SeededContour:
             progress: told how far it is.
 
         Raises:
-            BadInput: a click outside the scan or in air, fat or bone, labels on another grid, or an MR without a click.
+            BadInput: a click outside the scan or in air, fat or bone, labels on another grid, a CT whose values are no
+                HU, or an MR without a click.
             StageFailed: nothing like a liver lies about the click, or is found without one.
         """
         known = _known_tumours(volume, labels)

@@ -1,0 +1,124 @@
+"""The liver by TotalSegmentator (Wasserthal et al., Radiology: AI 5(5), 2023), where it is installed.
+
+It runs as a program of its own: `TotalSegmentator -i SCAN -o FOLDER --task total --roi_subset liver` writes a file for
+each class into the folder. The program and the weights of both tasks are under the Apache licence 2.0; it fetches the
+weights when it runs first.
+"""
+
+import shutil
+import subprocess
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from glisson.core.arrays import FloatArray
+from glisson.core.errors import BadInput, StageFailed
+from glisson.core.image import Grid, LabelMap, Volume
+from glisson.core.parameters import parameter
+from glisson.core.protocols import Progress, Segmentation, silent
+from glisson.core.status import Status
+from glisson.preoperative.liver.plugins.cleaned import cleaned_liver
+
+_PROGRAM = "TotalSegmentator"
+_TASKS = {"CT": "total", "MR": "total_mr"}
+
+
+@dataclass(frozen=True)
+class TotalSegmentatorParameters:
+    """On which device it runs, and at which resolution."""
+
+    device: str = parameter("gpu", "Where the network runs.", choices=("gpu", "cpu", "mps"))
+    fast: bool = parameter(False, "Voxels of 3 mm instead of 1.5 mm: sooner ready, and coarser.")
+
+
+class TotalSegmentator:
+    """Liver from a CT or MR by a trained network; clicks are not used."""
+
+    name: ClassVar[str] = "total-segmentator"
+    summary: ClassVar[str] = "Liver by TotalSegmentator's network, from a CT or an MR without a click."
+    Parameters: ClassVar[type[TotalSegmentatorParameters]] = TotalSegmentatorParameters
+
+    def __init__(self, parameters: TotalSegmentatorParameters) -> None:
+        self._parameters = parameters
+
+    @classmethod
+    def missing_dependencies(cls) -> tuple[str, ...]:
+        """The program, where it is not on the path."""
+        return () if shutil.which(_PROGRAM) else (_PROGRAM,)
+
+    def segment(
+        self, volume: Volume, labels: LabelMap | None, seeds_mm: FloatArray, progress: Progress = silent
+    ) -> Segmentation:
+        """The liver ({1: "liver"}) with the tumours that are known, in one part.
+
+        Args:
+            volume: a CT (HU) or an MR.
+            labels: tumours that are known already, on the same grid.
+            seeds_mm: not used.
+            progress: told for how long it has run.
+
+        Raises:
+            BadInput: the program is not installed, or what it found falls into parts.
+            StageFailed: it ended with an error, or found no liver.
+        """
+        program = shutil.which(_PROGRAM)
+        if program is None:
+            raise BadInput(f"{_PROGRAM} is not installed: pip install {_PROGRAM}, or choose another technique.")
+        with tempfile.TemporaryDirectory(prefix="glisson-total-") as name:
+            folder = Path(name)
+            _write(folder / "scan.nii.gz", volume)
+            options = ["--task", _TASKS[volume.modality], "--roi_subset", "liver", "--device", self._parameters.device]
+            if self._parameters.fast:
+                options.append("--fast")
+            _run([program, "-i", str(folder / "scan.nii.gz"), "-o", str(folder / "found"), *options], folder, progress)
+            found = _read(folder / "found" / "liver.nii.gz", volume.grid)
+        return cleaned_liver(volume, found, labels, _PROGRAM)
+
+
+def _run(command: list[str], folder: Path, progress: Progress) -> None:
+    """Run the program to its end; it is killed when this process is interrupted."""
+    start, log_path = time.monotonic(), folder / "log.txt"
+    with (
+        log_path.open("wb") as log,
+        subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, cwd=folder) as child,
+    ):
+        try:
+            while child.poll() is None:
+                progress(None, f"{_PROGRAM}, {time.monotonic() - start:.0f} s")
+                time.sleep(0.1)
+        finally:
+            child.kill()
+    if child.returncode != 0:
+        lines = log_path.read_text(encoding="utf-8", errors="replace").split("\n")
+        last = next((line.strip() for line in reversed(lines) if line.strip()), "it said nothing")
+        raise StageFailed(f"{_PROGRAM} ended with the code {child.returncode}: {last[:200]}.", Status.STAGNATED)
+
+
+def _write(path: Path, volume: Volume) -> None:
+    import SimpleITK as sitk  # slow to load, and `--help` needs this module
+
+    image = sitk.GetImageFromArray(volume.voxels.T)  # SimpleITK counts the slowest axis first, and in LPS as we do
+    image.SetSpacing(volume.grid.spacing_mm.tolist())
+    image.SetOrigin(volume.grid.origin_mm.tolist())
+    image.SetDirection(volume.grid.direction.ravel().tolist())
+    sitk.WriteImage(image, str(path))
+
+
+def _read(path: Path, grid: Grid) -> NDArray[np.bool_]:
+    import SimpleITK as sitk
+
+    if not path.is_file():
+        raise StageFailed(f"{_PROGRAM} ended without a mask of the liver ({path.name}).", Status.STAGNATED)
+    image = sitk.ReadImage(str(path))
+    direction = np.reshape(image.GetDirection(), (3, 3))
+    found = Grid(image.GetSize(), np.array(image.GetSpacing()), np.array(image.GetOrigin()), direction)
+    # NIfTI keeps places with the precision of float32.
+    if not grid.matches(found, tolerance_mm=0.01):
+        raise StageFailed(f"{_PROGRAM} gave a mask on another grid than the scan's.", Status.STAGNATED)
+    mask: NDArray[np.bool_] = sitk.GetArrayFromImage(image).T > 0
+    return mask
