@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from glisson.core.arrays import FloatArray
 from glisson.core.errors import BadInput
 from glisson.core.image import LabelMap, Volume
 from glisson.core.protocols import Progress
@@ -58,12 +60,12 @@ class VesselsStage(Stage):
         return {"source": source, **_facts(systems)}
 
 
-def _clicks(settings: Settings) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:
+def _clicks(settings: Settings) -> dict[str, FloatArray]:
     clicks = {"portal": settings.vessels.portal_mm, "hepatic": settings.vessels.hepatic_mm}
     return {name: np.array(click) for name, click in clicks.items() if click is not None}
 
 
-def _found(volume: Volume, organ: LabelMap, settings: Settings, progress: Progress) -> np.ndarray[Any, Any]:
+def _found(volume: Volume, organ: LabelMap, settings: Settings, progress: Progress) -> NDArray[np.bool_]:
     technique = settings.choices["vessels"].make(SETTINGS, settings.seed)
     found: LabelMap = technique.find(volume, organ, progress)
     if not volume.grid.matches(found.grid) or "vessel" not in found.names.values():

@@ -166,7 +166,8 @@ def _direction(points: FloatArray, along: FloatArray, at: int, sense: int, run: 
     near, far = (int(np.abs(along - (along[at] + sense * d)).argmin()) for d in (skipped, skipped + _DIRECTION_MM))
     way = points[far] - points[near]
     length = float(np.linalg.norm(way))
-    return way / length if length > 0.0 else np.zeros(3)
+    direction: FloatArray = way / max(length, 1e-12)
+    return direction
 
 
 def _evened(points: FloatArray) -> FloatArray:

@@ -115,7 +115,7 @@ class _Growth:
         if old.parent == ROOT:
             return False
         self._feed(old, -1.0)
-        below: set[int] | None = None
+        below: dict[int, None] | None = None
         best, least = old, self._cost(old) - 1e-6
         for step in self._into[number]:
             if step.start != old.start or step.parent not in self.taken or not self._leads_on(step):
@@ -198,7 +198,7 @@ def _steps_at_sites(pieces: Sequence[Piece]) -> list[_Step]:
         for end, site in enumerate(piece.sites):
             if site != FREE:
                 at_site[site].append((number, end))
-    steps = []
+    steps: list[_Step] = []
     for meeting in at_site.values():
         inward = np.array([pieces[number].inward[end] for number, end in meeting])
         turns = 0.5 * (1.0 + inward @ inward.T)

@@ -127,7 +127,7 @@ def _named_trees(
     """The trees of all systems in the middle of the mask; short ones beside a system's first are left out."""
     found = _trees(pieces, grown)
     middle = centred([smoothed(tree) for _, tree in found], mask, grid)
-    named = []
+    named: list[VesselTree] = []
     for number, name in enumerate(SYSTEMS):
         own = [tree for (system, _), tree in zip(found, middle, strict=True) if system == number]
         kept = [tree for n, tree in enumerate(own) if n == 0 or tree.length_mm >= _SHORTEST_MM]
