@@ -17,7 +17,7 @@ from glisson.io.vessel_files import read_vessels, write_vessels
 from glisson.phantom.canvas import Canvas, voxel_places
 
 GRID = Grid((84, 60, 56), [1.0, 1.0, 1.0], [-40.0, -30.0, -28.0])
-CLICKS = VesselSettings((-28.0, 8.0, -8.0), (2.0, -20.0, 20.0))
+CLICKS = VesselSettings(((-28.0, 8.0, -8.0),), ((2.0, -20.0, 20.0),))
 PORTAL = VesselTree(
     "portal", [[-30, 8, -8], [32, 8, -8], [8, 8, -8], [20, 20, 12]], [3.5, 2.5, 2.2, 2.0], [[0, 1], [2, 3]]
 )
@@ -69,9 +69,9 @@ def test_vessels_are_found_and_told_apart(found):
 def test_what_did_not_change_is_kept(found):
     case, *_ = found
     assert PIPELINE.run(case, "vessels").seconds["vessels"] == 0.0
-    moved = replace(case.settings(), vessels=VesselSettings((-26.0, 8.0, -8.0), CLICKS.hepatic_mm))
+    moved = replace(case.settings(), vessels=VesselSettings(((-26.0, 8.0, -8.0),), CLICKS.hepatic_mm))
     assert PIPELINE.run(case, "vessels", moved).seconds["vessels"] > 0.0
-    assert case.settings().vessels.portal_mm == (-26.0, 8.0, -8.0)
+    assert case.settings().vessels.portal_mm == ((-26.0, 8.0, -8.0),)
 
 
 def test_the_command(found, glisson, tmp_path):

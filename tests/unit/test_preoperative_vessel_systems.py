@@ -31,7 +31,7 @@ def liver():
 
 PORTAL = (((10, 40, 20), (80, 40, 20), 3.0, 2.2), ((40, 40, 20), (55, 65, 40), 2.0, 1.6))
 HEPATIC = (((45, 10, 60), (45, 40, 22), 3.0, 2.6), ((45, 40, 22), (45, 60, -1), 2.4, 2.0))
-CLICKS = {"portal": np.array([10.0, 40.0, 20.0]), "hepatic": np.array([45.0, 10.0, 60.0])}
+CLICKS = {"portal": np.array([[10.0, 40.0, 20.0]]), "hepatic": np.array([[45.0, 10.0, 60.0]])}
 
 
 def test_pieces_of_a_fork():
@@ -92,7 +92,7 @@ def test_given_systems_keep_their_labels():
 
 def test_a_click_far_from_all_vessels_is_refused():
     with pytest.raises(BadInput, match="nearest vessel"):
-        split_systems(painted(*PORTAL), liver(), CLICKS | {"hepatic": np.array([5.0, 5.0, 5.0])})
+        split_systems(painted(*PORTAL), liver(), CLICKS | {"hepatic": np.array([[5.0, 5.0, 5.0]])})
 
 
 def test_roots_that_are_guessed_are_said_to_be():

@@ -90,8 +90,8 @@ def changed_settings(settings: Settings, arguments: argparse.Namespace) -> Setti
         settings = replace(settings, segment=SegmentSettings(seed_points_mm=points))
     for name in ("portal", "hepatic"):
         if name in given:
-            click = {f"{name}_mm": point_from_text(given[name])}
-            settings = replace(settings, vessels=replace(settings.vessels, **click))
+            clicks = {f"{name}_mm": tuple(point_from_text(text) for text in given[name])}
+            settings = replace(settings, vessels=replace(settings.vessels, **clicks))
     return settings
 
 

@@ -14,8 +14,11 @@ from glisson.framework.comparing import compare_vessels
 
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
     add_run_arguments(parser, ("vessels",), ())
-    parser.add_argument("--portal", metavar="X,Y,Z", help="a click where the portal vein enters the liver, LPS mm")
-    parser.add_argument("--hepatic", metavar="X,Y,Z", help="a click where the hepatic veins leave it, LPS mm")
+    for name, words in (("portal", "the portal vein enters the liver"), ("hepatic", "a hepatic vein leaves the liver")):
+        parser.add_argument(
+            f"--{name}", metavar="X,Y,Z", action="append",
+            help=f"a click where {words}, LPS mm; may be repeated, also for large branches",
+        )  # fmt: skip
     parser.add_argument(
         "--reference", metavar="MASK", help="masks of the veins to compare with: a file or a folder of DICOM folders"
     )

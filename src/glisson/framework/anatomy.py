@@ -62,7 +62,7 @@ class VesselsStage(Stage):
 
 def _clicks(settings: Settings) -> dict[str, FloatArray]:
     clicks = {"portal": settings.vessels.portal_mm, "hepatic": settings.vessels.hepatic_mm}
-    return {name: np.array(click) for name, click in clicks.items() if click is not None}
+    return {name: np.array(points) for name, points in clicks.items() if points}
 
 
 def _found(volume: Volume, organ: LabelMap, settings: Settings, progress: Progress) -> NDArray[np.bool_]:
@@ -79,6 +79,6 @@ def _facts(systems: VesselSystems) -> dict[str, Any]:
     return {
         "volume_ml": {name: systems.labels.volume_ml(name) for name in systems.labels.names.values()},
         "length_mm": {tree.name: tree.length_mm for tree in systems.trees},
-        "roots": {name: root.point_mm.tolist() for name, root in systems.roots.items()},
+        "roots": {name: root.points_mm.tolist() for name, root in systems.roots.items()},
         "notes": list(systems.notes),
     }

@@ -88,11 +88,11 @@ class SegmentSettings:
 class VesselSettings:
     """Where the vessel systems start."""
 
-    portal_mm: tuple[float, float, float] | None = parameter(
-        None, "Where the portal vein enters the liver, [x, y, z] in LPS mm; none: where it likely does."
+    portal_mm: tuple[Point, ...] = parameter(
+        (), "Where portal veins enter the liver, a list of [x, y, z] in LPS mm; none: where they likely do."
     )
-    hepatic_mm: tuple[float, float, float] | None = parameter(
-        None, "Where the hepatic veins leave the liver, [x, y, z] in LPS mm; none: where they likely do."
+    hepatic_mm: tuple[Point, ...] = parameter(
+        (), "Where hepatic veins leave the liver, a list of [x, y, z] in LPS mm; none: where they likely do."
     )
 
 

@@ -27,9 +27,9 @@ _SURE = 1.5
 
 @dataclass(frozen=True, eq=False)
 class Root:
-    """A point (3,) LPS mm, and why it may be wrong (empty: it was clicked, or nothing rivals it)."""
+    """Points (k, 3) LPS mm, and why they may be wrong (empty: they were clicked, or nothing rivals it)."""
 
-    point_mm: FloatArray
+    points_mm: FloatArray
     doubt: str = ""
 
 
@@ -41,7 +41,7 @@ def likely_roots(
     Args:
         pieces: of the vessels in which the system lies.
         organ: the organ ("liver").
-        clicks: roots (3,) LPS mm that a person gave, by system.
+        clicks: roots (k, 3) LPS mm that a person gave, by system.
 
     Raises:
         BadInput: a click lies far from all vessels, or there is no vessel.
@@ -57,7 +57,13 @@ def likely_roots(
     }
 
 
-def _clicked(name: str, pieces: Sequence[Piece], click: FloatArray) -> Root:
+def _clicked(name: str, pieces: Sequence[Piece], clicks: FloatArray) -> Root:
+    for click in clicks:
+        _require_vessel(name, pieces, click)
+    return Root(clicks)
+
+
+def _require_vessel(name: str, pieces: Sequence[Piece], click: FloatArray) -> None:
     apart = min(float((np.linalg.norm(piece.points_mm - click, axis=1) - piece.radii_mm).min()) for piece in pieces)
     if apart > _FARTHEST_CLICK_MM:
         place = ", ".join(f"{value:.1f}" for value in click)
@@ -65,7 +71,6 @@ def _clicked(name: str, pieces: Sequence[Piece], click: FloatArray) -> Root:
             f"The click --{name} ({place}) lies {apart:.0f} mm from the nearest vessel that was found; click into the "
             f"{name} vein where it enters the liver (LPS mm)."
         )
-    return Root(np.asarray(click, dtype=np.float64))
 
 
 def _expected(name: str, pieces: Sequence[Piece], middle: FloatArray, spread: FloatArray) -> Root:
@@ -77,7 +82,7 @@ def _expected(name: str, pieces: Sequence[Piece], middle: FloatArray, spread: Fl
     elsewhere = np.linalg.norm(points - points[best], axis=1) > _ANOTHER_MM
     rival = float(scores[elsewhere].max(initial=0.0))
     if radii[best] < _WIDE_MM:
-        return Root(points[best], f"the vessel there is only {2.0 * radii[best]:.0f} mm wide")
+        return Root(points[best : best + 1], f"the vessel there is only {2.0 * radii[best]:.0f} mm wide")
     if scores[best] < _SURE * rival:
-        return Root(points[best], "another vessel is as likely")
-    return Root(points[best])
+        return Root(points[best : best + 1], "another vessel is as likely")
+    return Root(points[best : best + 1])

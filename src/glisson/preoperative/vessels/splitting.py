@@ -3,8 +3,7 @@
 Portal and hepatic veins touch where they cross, so a mask of both is one piece with false branchings. Each piece of
 its skeleton is to have one vessel that it comes from. All systems grow at the same time from their roots; of all
 steps from what is grown to what is not the cheapest is taken, as Prim's algorithm makes a minimum spanning forest.
-A wrong step at a crossing thus waits until the right vessel has come from the other side. In the end pieces change
-to stems that suit them better. A step costs
+A wrong step at a crossing thus waits until the right vessel has come from the other side. A step costs
 
 - the turn, (1 - cos angle) / 2, less the least turn into the same piece at the same site: a branch has no better stem
   than its own, but a vessel that crosses has itself on the other side;
@@ -32,6 +31,9 @@ _TURN = 0.2
 _WIDENING = 2.0
 _ROOT_MM = 25.0
 """Ends within this distance of a root may come from it: hepatic veins meet outside the liver."""
+
+_FIRST = -1.0
+"""Cost of the piece at a root, less than any other."""
 
 ROOT = -1
 ANYWHERE = -1
@@ -94,41 +96,6 @@ class _Growth:
                 if self._leads_on(following):
                     self.offer(system, following)
 
-    def improve(self) -> None:
-        """Give pieces to parents that suit them better, as long as any is found.
-
-        What was taken early may have come from a vessel that only crosses, while the right one came later.
-        """
-        for _ in range(len(self._pieces)):
-            changes = [self._better(number) for number in self.taken]
-            if not any(changes):
-                break
-        children = self._children()
-        for number, step in self.taken.items():
-            if step.parent == ROOT:
-                for below in _below(number, children):
-                    self.system[below] = self.system[number]
-
-    def _better(self, number: int) -> bool:
-        """Give a piece, with all that comes from it, to a cheaper parent; whether there is one."""
-        old = self.taken[number]
-        if old.parent == ROOT:
-            return False
-        self._feed(old, -1.0)
-        below: dict[int, None] | None = None
-        best, least = old, self._cost(old) - 1e-6
-        for step in self._into[number]:
-            if step.start != old.start or step.parent not in self.taken or not self._leads_on(step):
-                continue
-            cost = self._cost(step)
-            if cost < least:
-                below = _below(number, self._children()) if below is None else below
-                if step.parent not in below:
-                    best, least = step, cost
-        self.taken[number] = best
-        self._feed(best, 1.0)
-        return best is not old
-
     def _take(self, step: _Step) -> None:
         self.taken[step.child] = step
         self._feed(step, 1.0)
@@ -166,18 +133,18 @@ def split_pieces(pieces: Sequence[Piece], seeds_mm: Sequence[FloatArray]) -> dic
 
     Args:
         pieces: of a skeleton.
-        seeds_mm: the root of each system (3,), LPS mm.
+        seeds_mm: the roots of each system (k, 3), LPS mm.
     """
     if not pieces:
         return {}
     growth = _Growth(pieces)
-    for system, seed in enumerate(seeds_mm):
-        number = _piece_at(pieces, seed)
-        growth.offer(system, _Step(ROOT, number, ANYWHERE, _nearer_end(pieces[number], seed), -1.0))
-        for step in _steps_from_root(pieces, seed):
-            growth.offer(system, step)
+    for system, seeds in enumerate(seeds_mm):
+        for seed in seeds:
+            number = _piece_at(pieces, seed)
+            growth.offer(system, _Step(ROOT, number, ANYWHERE, _nearer_end(pieces[number], seed), _FIRST))
+            for step in _steps_from_root(pieces, seed):
+                growth.offer(system, step)
     growth.grow()
-    growth.improve()
     return growth.result()
 
 
@@ -200,10 +167,12 @@ def _steps_at_sites(pieces: Sequence[Piece]) -> list[_Step]:
                 at_site[site].append((number, end))
     steps: list[_Step] = []
     for meeting in at_site.values():
+        if len(meeting) < 2:
+            continue
         inward = np.array([pieces[number].inward[end] for number, end in meeting])
         turns = 0.5 * (1.0 + inward @ inward.T)
-        np.fill_diagonal(turns, np.inf)
-        costs = turns - turns.min(axis=0) + _TURN * turns
+        least = np.where(np.eye(len(meeting), dtype=bool), np.inf, turns).min(axis=0)
+        costs = turns - least + _TURN * turns
         steps += [
             _Step(parent, child, leaves, start, float(costs[m, n]))
             for m, (parent, leaves) in enumerate(meeting)

@@ -45,14 +45,14 @@ def split_systems(vessels: NDArray[np.bool_], organ: LabelMap, clicks: Mapping[s
     Args:
         vessels: the mask, on the organ's grid.
         organ: the organ ("liver").
-        clicks: root (3,) LPS mm by system; a system without one starts where it likely does.
+        clicks: roots (k, 3) LPS mm by system; a system without one starts where it likely does.
 
     Raises:
         BadInput: a click lies far from all vessels.
     """
     pieces = skeleton_pieces(vessels, organ.grid)
     roots = likely_roots(dict.fromkeys(SYSTEMS, pieces), organ, clicks)
-    grown = split_pieces(pieces, [roots[name].point_mm for name in SYSTEMS])
+    grown = split_pieces(pieces, [roots[name].points_mm for name in SYSTEMS])
     voxels = _voxel_systems(vessels, organ.grid, pieces, grown)
     labels = LabelMap(voxels, organ.grid, _label_names(voxels))
     trees = _named_trees(pieces, grown, vessels, organ.grid)
@@ -77,7 +77,7 @@ def given_systems(given: LabelMap, organ: LabelMap, clicks: Mapping[str, FloatAr
     voxels = np.zeros(given.grid.shape, dtype=np.uint8)
     for number, name in enumerate(SYSTEMS, start=1):
         voxels[masks[name]] = number
-        grown = split_pieces(pieces[name], [roots[name].point_mm])
+        grown = split_pieces(pieces[name], [roots[name].points_mm])
         own = {n: Grown(number - 1, step.parent, step.start) for n, step in grown.items()}
         trees += _named_trees(pieces[name], own, masks[name], given.grid)
     return VesselSystems(LabelMap(voxels, given.grid, _label_names(voxels)), tuple(trees), roots, _root_notes(roots))
