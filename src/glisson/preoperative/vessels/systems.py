@@ -1,5 +1,6 @@
 """Portal and hepatic veins of a mask: a label for each voxel, and trees from their roots."""
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -12,7 +13,7 @@ from glisson.core.image import Grid, LabelMap
 from glisson.core.structures import VesselTree
 from glisson.preoperative.vessels.centrelines import Tree, centred, smoothed
 from glisson.preoperative.vessels.roots import Root, likely_roots
-from glisson.preoperative.vessels.skeleton import Piece, skeleton_pieces
+from glisson.preoperative.vessels.skeleton import FREE, Piece, skeleton_pieces
 from glisson.preoperative.vessels.splitting import ROOT, Grown, split_pieces
 
 SYSTEMS = ("portal", "hepatic")
@@ -56,7 +57,7 @@ def split_systems(vessels: NDArray[np.bool_], organ: LabelMap, clicks: Mapping[s
     voxels = _voxel_systems(vessels, organ.grid, pieces, grown)
     labels = LabelMap(voxels, organ.grid, _label_names(voxels))
     trees = _named_trees(pieces, grown, vessels, organ.grid)
-    return VesselSystems(labels, trees, roots, _root_notes(roots))
+    return VesselSystems(labels, trees, roots, (*_root_notes(roots), *_touching_notes(pieces, grown)))
 
 
 def given_systems(given: LabelMap, organ: LabelMap, clicks: Mapping[str, FloatArray]) -> VesselSystems:
@@ -93,6 +94,21 @@ def _root_notes(roots: Mapping[str, Root]) -> tuple[str, ...]:
         f"where the {name} veins start is a guess, {root.doubt}; check it, and click it with --{name} X,Y,Z"
         for name, root in roots.items()
         if root.doubt
+    )
+
+
+def _touching_notes(pieces: Sequence[Piece], grown: Mapping[int, Grown]) -> tuple[str, ...]:
+    """What to say where pieces of several systems meet: nothing but their course tells which is which there."""
+    at_site: dict[int, set[int]] = defaultdict(set)
+    for number, step in grown.items():
+        for site in pieces[number].sites:
+            at_site[site].add(step.system)
+    count = sum(len(systems) > 1 for site, systems in at_site.items() if site != FREE)
+    if not count:
+        return ()
+    return (
+        f"portal and hepatic veins touch at {count} place{'' if count == 1 else 's'}, where their course alone tells "
+        "which is which; check them, and click more branches with --portal and --hepatic X,Y,Z",
     )
 
 
