@@ -2,15 +2,13 @@
 
 import numpy as np
 import pytest
-from scipy import ndimage
-from skimage.filters import sato
 
 from glisson.core import Grid, LabelMap, Volume
 from glisson.framework.segmentation_scores import centreline_dice
 from glisson.phantom.family import make_phantom
 from glisson.preoperative.vessels.isotropic import IsotropicBox
 from glisson.preoperative.vessels.top_hat import TopHat, TopHatParameters
-from glisson.preoperative.vessels.tubeness import Tubeness, TubenessParameters, _ridges
+from glisson.preoperative.vessels.tubeness import Tubeness, TubenessParameters
 
 
 @pytest.fixture(scope="module")
@@ -66,15 +64,3 @@ def test_a_dark_duct_of_three_pixels_and_more(radius):
     for technique in (Tubeness(TubenessParameters("dark")), TopHat(TopHatParameters("dark"))):
         found = technique.find(volume, LabelMap(organ, grid, {1: "liver"})).mask("vessel")
         assert centreline_dice(found, duct) >= 0.85
-
-
-def test_ridges_are_those_of_another_library():
-    random = np.random.default_rng(7)
-    above = (20.0 * random.standard_normal((26, 24, 22))).astype(np.float32)
-    above[8:12, 10:13] += 60.0
-    for sigma in (1.2, 2.0):
-        found = _ridges(above, np.ones(above.shape, dtype=bool), sigma)
-        theirs = sato(above, sigmas=[sigma], black_ridges=False)
-        asked = ndimage.gaussian_filter(above, sigma, truncate=4.0) > 0.0
-        assert np.abs(found - theirs)[asked].max() < 0.02 * theirs.max()
-        assert not found[~asked].any()
