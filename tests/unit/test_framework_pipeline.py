@@ -250,3 +250,25 @@ def test_a_damaged_record_is_as_good_as_none(case: Case, damage: str) -> None:
     ran(case)
     case.path("results/provenance/counting.json").write_text(damage)
     assert ran(case) == ["counting"]
+
+
+class Beside(Stage):
+    name = "beside"
+    inputs = ("labels/double.txt",)
+    outputs = ("labels/beside.txt",)
+    packages = ()
+
+    def run(self, case: Case, settings: Settings, out: Path, progress: Progress) -> Mapping[str, Any]:
+        (out / self.outputs[0]).write_text("beside")
+        return {}
+
+
+def test_only_stages_that_are_needed_run(case: Case) -> None:
+    pipeline = Pipeline([Doubling(), Noting(), Counting(), Beside()])
+    assert set(pipeline.run(case, "beside").seconds) == {"doubling", "beside"}
+    assert set(pipeline.run(case, "counting").seconds) == {"doubling", "noting", "counting"}
+    case.path(SCAN).write_text("8")
+    pipeline.run(case, "beside")
+    # Results of a stage that was not asked for are told to be out of date, not made anew.
+    assert "counting" in pipeline.outdated(case)
+    assert case.has(STALE)

@@ -27,6 +27,7 @@ COMMANDS = {
     "demo": "run the whole way on the phantom that ships with Glisson",
     "new": "make a case folder from a scan and label maps; nothing that identifies the patient is copied",
     "segment": "find the liver in the scan, or check and clean a label map that was given",
+    "vessels": "find portal and hepatic veins inside the liver, tell them apart, and follow them from their roots",
     "correct": "correct the liver's mask by clicks into what is missing or too much",
     "mesh": "build the liver's model: surface, tetrahedra, materials, attachments, structures",
     "simulate": "compute what scenario.toml does to the liver (runs the stages before it where they are out of date)",

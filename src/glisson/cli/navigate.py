@@ -7,11 +7,11 @@ from glisson.cli.console import Answer
 from glisson.cli.options import add_seed_points
 from glisson.cli.progress import StageLines
 from glisson.cli.running import RESULT_KEYS, add_run_arguments, results_answer, run_to
-from glisson.framework.settings import KINDS
+from glisson.framework.settings import TO_REPORT
 
 
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
-    add_run_arguments(parser, tuple(KINDS), ("scenario", "plane"))
+    add_run_arguments(parser, TO_REPORT, ("scenario", "plane"))
     add_seed_points(parser)
 
 

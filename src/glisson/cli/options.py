@@ -88,6 +88,10 @@ def changed_settings(settings: Settings, arguments: argparse.Namespace) -> Setti
     if "seed_point" in given:
         points = tuple(point_from_text(text) for text in given["seed_point"])
         settings = replace(settings, segment=SegmentSettings(seed_points_mm=points))
+    for name in ("portal", "hepatic"):
+        if name in given:
+            clicks = {f"{name}_mm": tuple(point_from_text(text) for text in given[name])}
+            settings = replace(settings, vessels=replace(settings.vessels, **clicks))
     return settings
 
 

@@ -73,6 +73,12 @@ class VesselTree:
         object.__setattr__(self, "edges", frozen_ints(self.edges, (None, 2), "vessel edges"))
         check_range(self.edges, count, "A vessel edge")
 
+    @property
+    def length_mm(self) -> float:
+        """Length of all edges together."""
+        ends = self.points_mm[self.edges]
+        return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
+
 
 @dataclass(frozen=True, eq=False)
 class Tumour:

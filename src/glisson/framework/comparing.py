@@ -1,14 +1,18 @@
-"""What can be said of a case's liver mask: its volume, and how it agrees with a reference of any origin."""
+"""What can be said of a case's liver mask and vessels: how they agree with a reference of any origin."""
 
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from glisson.core.errors import BadInput
-from glisson.framework.case import ORGAN, Case
-from glisson.framework.segmentation_scores import SegmentationScores, segmentation_scores
+from glisson.framework.case import ORGAN, VESSELS, Case
+from glisson.framework.segmentation_scores import SegmentationScores, centreline_dice, segmentation_scores
 from glisson.io.images import read_label_maps, read_labels
 from glisson.io.label_groups import on_grid_of
 from glisson.preoperative.model.regions import ORGAN as LIVER
+from glisson.preoperative.vessels.systems import SYSTEMS, UNTOLD
 
 
 def compare_with_reference(case: Case, path: str | Path) -> SegmentationScores:
@@ -32,3 +36,33 @@ def compare_with_reference(case: Case, path: str | Path) -> SegmentationScores:
 def given_mask_facts(case: Case) -> dict[str, Any]:
     """The facts of the segment stage where a person gave or corrected the mask: nothing was flagged."""
     return {"volume_ml": read_labels(case.path(ORGAN)).volume_ml(LIVER), "flagged_slices": [], "flags": []}
+
+
+def compare_vessels(case: Case, path: str | Path) -> dict[str, float | None]:
+    """Overlap of the case's vessels with masks of portal and hepatic veins, inside the liver.
+
+    `dice` and `centreline_dice` are those of all vessels together, `right_system` the share of the voxels in both
+    whose system is that of the reference (None where it does not tell them apart).
+
+    Raises:
+        BadInput: the masks cannot be read, hold no vessels, or lie on another grid.
+    """
+    found, inside = read_labels(case.path(VESSELS)), read_labels(case.path(ORGAN)).mask(LIVER)
+    masks: dict[str, NDArray[np.bool_]] = {}
+    for labels in read_label_maps(path):
+        for name in set(labels.names.values()) & {*SYSTEMS, UNTOLD}:
+            placed = on_grid_of(found.grid, labels, f"the reference {path}")
+            masks[name] = placed.mask(name) & inside
+    if not any(mask.any() for mask in masks.values()):
+        raise BadInput(f"The reference {path} has no label {', '.join((*SYSTEMS, UNTOLD))} inside the liver.")
+    reference = np.logical_or.reduce(list(masks.values()))
+    whole = (found.voxels > 0) & inside
+    right = None
+    if set(SYSTEMS) <= set(masks):
+        agreeing = sum(int((found.mask(name) & masks[name]).sum()) for name in SYSTEMS)
+        right = agreeing / max(int((whole & reference).sum()), 1)
+    return {
+        "dice": segmentation_scores(whole, reference, found.grid).dice,
+        "centreline_dice": centreline_dice(whole, reference),
+        "right_system": right,
+    }

@@ -65,7 +65,7 @@ class RunResult:
 
 
 class Pipeline:
-    """The stages of a case in their order."""
+    """The stages of a case in an order in which each comes after those that it needs."""
 
     def __init__(self, stages: Sequence[Stage]) -> None:
         self._stages = tuple(stages)
@@ -83,7 +83,7 @@ class Pipeline:
         replace: bool = False,
         listener: Listener | None = None,
     ) -> RunResult:
-        """Bring the stages up to `last` up to date, under the lock of the case.
+        """Bring `last` and the stages that it needs up to date, under the lock of the case.
 
         Where results of any stage are out of date when this ends, well or not, `results/STALE.txt` says so.
 
@@ -102,7 +102,7 @@ class Pipeline:
         """
         heard = listener or Unheard()
         used = case.settings() if settings is None else settings
-        wanted = self._stages[: self.names.index(last) + 1]
+        wanted = self._needed(last)
         for stage in wanted:
             for kind, name in stage.techniques(used):
                 technique_class(kind, name)
@@ -153,6 +153,16 @@ class Pipeline:
     def outdated(self, case: Case) -> dict[str, str]:
         """Stages whose results are out of date: name → why, in a few words."""
         return outdated(self._stages, case, case.settings())
+
+    def _needed(self, last: str) -> tuple[Stage, ...]:
+        """A stage and those before it that make what it reads, directly or not."""
+        wanted: list[Stage] = []
+        read: set[str] = set()
+        for stage in reversed(self._stages[: self.names.index(last) + 1]):
+            if stage.name == last or read & set(stage.outputs):
+                wanted.insert(0, stage)
+                read |= set(stage.inputs)
+        return tuple(wanted)
 
     def _mark(self, case: Case, settings: Settings) -> None:
         """Say beside the results which of them are out of date, so that nobody takes them for current."""

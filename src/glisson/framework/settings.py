@@ -21,8 +21,17 @@ from glisson.preoperative.scenario.lever_placement import LeverLiftParameters
 SCHEMA = 1
 """Version of the case folder that this Glisson writes, and the newest that it reads."""
 
-KINDS = {"segment": "segmenter", "surface": "surface-extractor", "mesh": "mesher", "simulate": "solver"}
+KINDS = {
+    "segment": "segmenter",
+    "surface": "surface-extractor",
+    "mesh": "mesher",
+    "simulate": "solver",
+    "vessels": "vessel-segmenter",
+}
 """Section of `case.toml` → kind of the technique that is chosen there."""
+
+TO_REPORT = ("segment", "surface", "mesh", "simulate")
+"""Sections whose techniques the report needs."""
 
 GIVEN_LABELS = "labels"
 """The segmenter that takes a label map that was given."""
@@ -77,6 +86,18 @@ class SegmentSettings:
 
 
 @dataclass(frozen=True)
+class VesselSettings:
+    """Where the vessel systems start."""
+
+    portal_mm: tuple[Point, ...] = parameter(
+        (), "Where portal veins enter the liver, a list of [x, y, z] in LPS mm; none: where they likely do."
+    )
+    hepatic_mm: tuple[Point, ...] = parameter(
+        (), "Where hepatic veins leave the liver, a list of [x, y, z] in LPS mm; none: where they likely do."
+    )
+
+
+@dataclass(frozen=True)
 class PlaneSettings:
     """Where the resection plane lies."""
 
@@ -127,12 +148,19 @@ SECTIONS: Mapping[str, type[Any]] = MappingProxyType(
         "rod": RodSettings,
         "plane": PlaneSettings,
         "scenario": LeverLiftParameters,
+        "vessels": VesselSettings,
     }
 )
 """Section of `case.toml` → dataclass of the keys that are ours there, beside those of a technique."""
 
 DEFAULT_TECHNIQUES = MappingProxyType(
-    {"segment": "seeded-contour", "surface": "marching-cubes", "mesh": "mmg", "simulate": "quasi-static"}
+    {
+        "segment": "seeded-contour",
+        "surface": "marching-cubes",
+        "mesh": "mmg",
+        "simulate": "quasi-static",
+        "vessels": "tubeness",
+    }
 )
 """Section of `case.toml` → technique that is used where none was chosen."""
 
@@ -156,6 +184,7 @@ class Settings:
     rod: RodSettings = field(default_factory=RodSettings)
     plane: PlaneSettings = field(default_factory=PlaneSettings)
     scenario: LeverLiftParameters = field(default_factory=LeverLiftParameters)
+    vessels: VesselSettings = field(default_factory=VesselSettings)
     target: str | None = None
     seed: int = 0
 

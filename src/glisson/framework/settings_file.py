@@ -43,6 +43,7 @@ _ABOUT = {
     "surface": "The closed surface of the liver's mask.",
     "mesh": "The tetrahedra inside the surface.",
     "simulate": "The solver of the manoeuvre that scenario.toml describes.",
+    "vessels": "Portal and hepatic veins inside the liver, found in a scan with contrast agent (glisson vessels).",
     "capsule": "Glisson's capsule around the organ; materials of the regions inside it are further down.",
     "rod": "The wire or stent in the duct as an elastic rod, held at the duct's mouth.",
     "plane": "The resection plane; the side of the target is removed.",

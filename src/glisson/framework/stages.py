@@ -12,6 +12,7 @@ from glisson.core.deformation import Deformation
 from glisson.core.errors import BadInput, StageFailed
 from glisson.core.protocols import Progress
 from glisson.core.status import Status
+from glisson.framework.anatomy import VesselsStage
 from glisson.framework.case import (
     GUIDANCE,
     MODEL,
@@ -183,4 +184,9 @@ STAGES: tuple[Stage, ...] = (
     NavigateStage(),
     ReportStage(),
 )
-PIPELINE = Pipeline(STAGES)
+"""From the scan to the report."""
+
+ANATOMY: tuple[Stage, ...] = (VesselsStage(),)
+"""What the report does not need: it is made when somebody asks for it."""
+
+PIPELINE = Pipeline((*STAGES, *ANATOMY))

@@ -1,7 +1,7 @@
 """One name for one structure: the names of other tools are mapped to those that Glisson uses.
 
 Canonical names: "liver", "tumour1", "tumour2" …, "portal", "hepatic", "artery", "duct", "wire",
-"gallbladder", "ivc". Whatever is unknown keeps its own name.
+"gallbladder", "ivc", and "vessels" where the systems are not told apart. Whatever is unknown keeps its own name.
 """
 
 import re
@@ -16,6 +16,9 @@ _CANONICAL = {
     "hepaticveins": "hepatic",
     "hepaticartery": "artery",
     "arteries": "artery",
+    "vessel": "vessels",
+    "livervessel": "vessels",
+    "livervessels": "vessels",
     "inferiorvenacava": "ivc",
     "venacava": "ivc",
     "bileduct": "duct",
@@ -24,7 +27,7 @@ _CANONICAL = {
     "biliarytract": "duct",
     "guidewire": "wire",
 }
-_PLAIN = ("liver", "gallbladder", "portal", "hepatic", "artery", "duct", "wire", "ivc")
+_PLAIN = ("liver", "gallbladder", "portal", "hepatic", "artery", "duct", "wire", "ivc", "vessels")
 _TUMOUR = re.compile(r"^(?:liver|hepatic)?(?:tumou?r|lesion|metastas[ie]s)s?0*(\d*)$")
 
 

@@ -4,9 +4,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from glisson.core import BadInput, Capsule, Curve, Material, Model, Rod, Structures, TriangleSurface, Tumour, VesselTree
+from glisson.core import BadInput, Capsule, Curve, Material, Model, Rod, Structures, TriangleSurface, Tumour
 from glisson.io.mesh_pairs import read_pair, write_pair
 from glisson.io.records import Record
+from glisson.io.vessel_files import tree_of_table, tree_table
 
 SCHEMA = 1
 """Version of the layout that is written; older ones are read."""
@@ -107,10 +108,7 @@ def _structures_table(structures: Structures) -> dict[str, Any]:
             {"name": t.name, "vertices_mm": t.surface.vertices, "triangles": t.surface.triangles}
             for t in structures.tumours
         ],
-        "trees": [
-            {"name": tree.name, "points_mm": tree.points_mm, "radii_mm": tree.radii_mm, "edges": tree.edges}
-            for tree in structures.trees
-        ],
+        "trees": [tree_table(tree) for tree in structures.trees],
         "duct_mm": structures.duct.points_mm if structures.duct else None,
         "wire_length_mm": structures.wire_length_mm,
     }
@@ -120,7 +118,7 @@ def _structures(record: Record) -> Structures:
     with record.building():
         return Structures(
             tumours=tuple(_tumour(entry) for entry in record.records("tumours")),
-            trees=tuple(_tree(entry) for entry in record.records("trees")),
+            trees=tuple(tree_of_table(entry) for entry in record.records("trees")),
             duct=Curve(record.floats("duct_mm", -1, 3)) if record.has("duct_mm") else None,
             wire_length_mm=record.number_or_none("wire_length_mm"),
         )
@@ -130,13 +128,3 @@ def _tumour(record: Record) -> Tumour:
     with record.building():
         surface = TriangleSurface(record.floats("vertices_mm", -1, 3), record.wholes("triangles", -1, 3))
         return Tumour(record.text("name"), surface)
-
-
-def _tree(record: Record) -> VesselTree:
-    with record.building():
-        return VesselTree(
-            record.text("name"),
-            record.floats("points_mm", -1, 3),
-            record.floats("radii_mm", -1),
-            record.wholes("edges", -1, 2),
-        )

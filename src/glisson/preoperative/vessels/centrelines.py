@@ -51,7 +51,7 @@ def centreline_trees(mask: NDArray[np.bool_], grid: Grid, smallest_mm: float = 0
 
     Each tree starts at the end nearest to its thickest point. Trees shorter than `smallest_mm` are left out.
     """
-    points, radii = _skeleton_points(mask, grid)
+    points, radii = skeleton_points(mask, grid)
     if len(points) < 2:
         return ()
     graph = _spanning_tree(points, grid)
@@ -61,8 +61,8 @@ def centreline_trees(mask: NDArray[np.bool_], grid: Grid, smallest_mm: float = 0
         members = np.flatnonzero(part == n)
         if len(members) >= 2:
             tree = _pruned(_rooted(points[members], radii[members], csr_array(graph[members][:, members])))
-            trees.append(_smoothed(tree))
-    trees = _centred(trees, mask, grid)
+            trees.append(smoothed(tree))
+    trees = centred(trees, mask, grid)
     kept = [tree for tree in trees if len(tree.points_mm) >= 2 and tree.length_mm >= smallest_mm]
     return tuple(sorted(kept, key=lambda tree: -tree.length_mm))
 
@@ -80,7 +80,7 @@ def longest_path(tree: Tree) -> IntArray:
     return np.array(path, dtype=np.int64)
 
 
-def _skeleton_points(mask: NDArray[np.bool_], grid: Grid) -> tuple[FloatArray, FloatArray]:
+def skeleton_points(mask: NDArray[np.bool_], grid: Grid) -> tuple[FloatArray, FloatArray]:
     """LPS mm (n, 3) and radii (n,) of the voxels of a mask's skeleton."""
     box = ndimage.find_objects(mask.astype(np.uint8))
     if not box:
@@ -95,14 +95,21 @@ def _skeleton_points(mask: NDArray[np.bool_], grid: Grid) -> tuple[FloatArray, F
 
 
 def _spanning_tree(points: FloatArray, grid: Grid) -> csr_array:
-    """Minimum spanning forest of the graph in which touching voxels are neighbours; weights are lengths in mm."""
+    """Minimum spanning forest of touching voxels; weights are lengths in mm."""
+    return csr_array(minimum_spanning_tree(touching_voxels(points, grid)))
+
+
+def touching_voxels(points: FloatArray, grid: Grid) -> csr_array:
+    """Graph in which voxels (by their centres, LPS mm) are neighbours that touch, by a corner at least.
+
+    The upper half of a symmetric matrix; weights are lengths in mm.
+    """
     reach = float(np.linalg.norm(grid.spacing_mm)) * 1.001
     pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
     apart = np.abs(grid.indices_from_points(points[pairs[:, 0]]) - grid.indices_from_points(points[pairs[:, 1]]))
     pairs = pairs[(apart < 1.5).all(axis=1)]
     lengths = np.linalg.norm(points[pairs[:, 1]] - points[pairs[:, 0]], axis=1)
-    graph = coo_array((lengths, (pairs[:, 0], pairs[:, 1])), shape=(len(points),) * 2)
-    return csr_array(minimum_spanning_tree(graph.tocsr()))
+    return csr_array(coo_array((lengths, (pairs[:, 0], pairs[:, 1])), shape=(len(points),) * 2).tocsr())
 
 
 def _rooted(points: FloatArray, radii: FloatArray, graph: csr_array) -> Tree:
@@ -156,7 +163,7 @@ def _kept(tree: Tree, alive: NDArray[np.bool_]) -> Tree:
     return Tree(tree.points_mm[alive], tree.radii_mm[alive], np.where(parents < 0, -1, place[parents]))
 
 
-def _smoothed(tree: Tree) -> Tree:
+def smoothed(tree: Tree) -> Tree:
     """Voxel steps evened out along the tree; ends stay."""
     if len(tree.points_mm) < 3:
         return tree
@@ -178,7 +185,7 @@ def _mixing(tree: Tree) -> csr_array:
     return csr_array(0.5 * (eye_array(count) + share @ both))
 
 
-def _centred(trees: Sequence[Tree], mask: NDArray[np.bool_], grid: Grid) -> list[Tree]:
+def centred(trees: Sequence[Tree], mask: NDArray[np.bool_], grid: Grid) -> list[Tree]:
     """The trees in the middle of the mask, with radii from its cross-section around each point.
 
     Each voxel belongs to the nearest point; volume, length and offset are evened out along the tree before
