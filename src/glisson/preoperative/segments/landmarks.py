@@ -1,7 +1,7 @@
 """The landmarks from which Couinaud's segments are told apart, by name.
 
-The veins and portal branches are those of Couinaud (1957) and Bismuth (1982); P2 to P8 is how surgeons call the
-portal branches of the segments. The dissertation (section 2.3.1) asks for landmarks on the portal vein and its branches.
+The veins and branches are those of Couinaud (1957) and Bismuth (1982); P2 to P8 is how surgeons call the portal
+branches of the segments. The dissertation (section 2.3.1) asks for landmarks on the portal vein and its branches.
 """
 
 from collections.abc import Sequence

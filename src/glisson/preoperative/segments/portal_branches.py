@@ -17,9 +17,9 @@ _REACH_MM = 20.0
 def branch_segments(trees: tuple[VesselTree, ...], landmarks: Landmarks) -> tuple[FloatArray, IntArray]:
     """Centreline points (n, 3) in LPS mm that belong to one segment, and their segments (n,).
 
-    The tree is followed from the bifurcation. A point belongs to the segment whose landmarks alone lie on it or beyond;
-    a twig without a landmark to the segment that it leaves. The trunk, from which several segments are fed, to none, and
-    neither do twigs that leave it, nor pieces of the tree without a landmark.
+    The tree is followed from the bifurcation. A point belongs to the segment whose landmarks alone lie on it or
+    beyond; a twig without a landmark to the segment that it leaves. The trunk, from which several segments are fed,
+    belongs to none, and neither do twigs that leave it or pieces of the tree without a landmark.
 
     Raises:
         BadInput: there is no tree, or a landmark is missing or far from every branch.
