@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from couinaud_landmarks import (
     clicked,
     dice_of_segments,
@@ -9,7 +10,6 @@ from couinaud_landmarks import (
     supplied_segments,
     true_landmarks,
 )
-
 from glisson.core.errors import BadInput
 from glisson.core.landmarks import Landmarks
 from glisson.core.structures import VesselTree
