@@ -61,8 +61,9 @@ def _points(landmarks: Landmarks, names: tuple[str, ...]) -> list[FloatArray]:
 
 
 def _normal(one: FloatArray, other: FloatArray, side: FloatArray, names: tuple[str, ...]) -> FloatArray:
+    """Unit normal (3,) of two directions, on the given side."""
     normal: FloatArray = np.cross(one, other)
     size = float(np.linalg.norm(normal))
     if size <= _LEAST_SINE * float(np.linalg.norm(one) * np.linalg.norm(other)):
         raise BadInput(f"The landmarks {', '.join(map(repr, names))} span no plane; set them farther apart.")
-    return normal if normal @ side > 0.0 else -normal
+    return normal / size if normal @ side > 0.0 else -normal / size
