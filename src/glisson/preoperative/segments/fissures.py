@@ -31,17 +31,19 @@ RIGHT_ACROSS, LEFT_ACROSS = (BIFURCATION, RIGHT_PORTAL), (UMBILICAL, LEFT_PORTAL
 """The landmarks in the plane that parts cranial from caudal segments, on either side."""
 
 _LEFTWARD, _BACKWARD, _CRANIAL = np.eye(3)
+# A right hepatic vein that runs backwards has the segments 5 and 8 before it rather than left of it.
+_MEDIAL = {RIGHT: np.array([0.3, -1.0, 0.0]), MIDDLE: _LEFTWARD, LEFT: _LEFTWARD}
 _LEAST_SINE = 0.1
 
 
 def fissure(landmarks: Landmarks, names: tuple[str, ...], towards_right_mm: float = 0.0) -> Plane:
-    """The plane through three landmarks, moved to the right; its normal points to the patient's left.
+    """The plane through three landmarks, moved away from its normal, which points to the patient's left (right fissure: front).
 
     Raises:
         BadInput: a landmark is missing, or they lie nearly on a line.
     """
     a, b, c = _points(landmarks, names)
-    normal = _normal(b - a, c - a, _LEFTWARD, names)
+    normal = _normal(b - a, c - a, _MEDIAL[names], names)
     return Plane(a - towards_right_mm * normal, normal)
 
 
