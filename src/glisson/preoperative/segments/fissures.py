@@ -37,7 +37,9 @@ _LEAST_SINE = 0.1
 
 
 def fissure(landmarks: Landmarks, names: tuple[str, ...], towards_right_mm: float = 0.0) -> Plane:
-    """The plane through three landmarks, moved away from its normal, which points to the patient's left (right fissure: front).
+    """The plane through three landmarks; its normal points to the patient's left, that of the right fissure forward.
+
+    It is moved against its normal by `towards_right_mm`.
 
     Raises:
         BadInput: a landmark is missing, or they lie nearly on a line.
