@@ -17,10 +17,12 @@ from glisson.core.arrays import FloatArray
 from glisson.core.deformation import Deformation
 from glisson.core.fine_zone import FineZone
 from glisson.core.image import LabelMap, Volume
+from glisson.core.landmarks import Landmarks
 from glisson.core.mesh import TetMesh, TriangleSurface
 from glisson.core.model import Material, Model
 from glisson.core.observations import Observations
 from glisson.core.scenario import Scenario
+from glisson.core.structures import VesselTree
 from glisson.core.transform import RigidTransform
 
 
@@ -92,6 +94,27 @@ class VesselSegmenter(Technique, Protocol):
 
         Raises:
             BadInput: the organ's mask is empty.
+        """
+
+
+class SegmentDivider(Technique, Protocol):
+    """Divides the liver into Couinaud's segments (entry-point group `glisson.segment_dividers`).
+
+    `landmarks` are the names of those that it needs.
+    """
+
+    landmarks: ClassVar[tuple[str, ...]]
+
+    def divide(self, organ: LabelMap, portal: tuple[VesselTree, ...], landmarks: Landmarks) -> LabelMap:
+        """Segments as {1: "segment 1", … 8: "segment 8"} on the organ's grid; every liver voxel has one.
+
+        Args:
+            organ: the organ ("liver").
+            portal: centrelines of the portal vein; none where they are not known.
+            landmarks: named points.
+
+        Raises:
+            BadInput: a landmark or the portal vein is missing, or landmarks are at odds.
         """
 
 

@@ -15,6 +15,7 @@ from glisson.core.protocols import (
     MaterialLaw,
     Mesher,
     Registration,
+    SegmentDivider,
     Segmenter,
     Solver,
     SurfaceExtractor,
@@ -25,6 +26,7 @@ from glisson.core.protocols import (
 KINDS: dict[str, tuple[str, type[Any]]] = {
     "segmenter": ("glisson.segmenters", Segmenter),
     "vessel-segmenter": ("glisson.vessel_segmenters", VesselSegmenter),
+    "segment-divider": ("glisson.segment_dividers", SegmentDivider),
     "surface-extractor": ("glisson.surface_extractors", SurfaceExtractor),
     "mesher": ("glisson.meshers", Mesher),
     "material": ("glisson.materials", MaterialLaw),
