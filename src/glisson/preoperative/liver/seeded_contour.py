@@ -1,9 +1,10 @@
 """The liver from a CT and a click or none, or an MR and a click: localized contours from slice to slice.
 
-Without a click the start is found (`automatic_start`). The click gives the liver's grey values; what of their
-band belongs together with it, by the width of passages and the grey value, is the region that the contours
-start from (`reachable`), completed by surface tumours (`completion`). The contours run from the largest slice
-to both ends (`propagation`).
+In a CT the start is found (`automatic_start`). It lies where the liver is widest and gives the liver's grey values;
+what of their band belongs together with it, by the width of passages and the grey value, is the region that the
+contours start from (`reachable`), completed by surface tumours (`completion`). A click that lies in that region says
+that it is the liver's, and then it does not matter where it lies; one that does not is the start itself. The contours
+run from the largest slice to both ends (`propagation`).
 """
 
 from dataclasses import dataclass
@@ -14,11 +15,10 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from glisson.core.arrays import FloatArray
-from glisson.core.errors import BadInput, StageFailed
+from glisson.core.errors import BadInput
 from glisson.core.image import Grid, LabelMap, Volume
 from glisson.core.parameters import parameter
 from glisson.core.protocols import Progress, Segmentation, silent
-from glisson.core.status import Status
 from glisson.core.units import place_text
 from glisson.preoperative.contours.localized_contour import LocalizedContourParameters
 from glisson.preoperative.imaging.axial import slice_axis
@@ -26,20 +26,19 @@ from glisson.preoperative.imaging.borders import touched_borders
 from glisson.preoperative.imaging.clicked import checked_clicks
 from glisson.preoperative.imaging.ct import smoothed_ct
 from glisson.preoperative.imaging.mr import smoothed_mr
+from glisson.preoperative.imaging.surroundings import Index
 from glisson.preoperative.imaging.working_grid import WorkingGrid
-from glisson.preoperative.liver.automatic_start import Start, find_start
-from glisson.preoperative.liver.completion import surface_tumours, without_gaps
-from glisson.preoperative.liver.intensity_prior import IntensityPrior, estimate_prior
+from glisson.preoperative.liver.automatic_start import Start
+from glisson.preoperative.liver.completion import without_gaps
+from glisson.preoperative.liver.intensity_prior import IntensityPrior
+from glisson.preoperative.liver.organ_region import GAP_MM, found_region, region_about, require_volume
 from glisson.preoperative.liver.propagation import propagate
-from glisson.preoperative.liver.reachable import opened, reachable_region
+from glisson.preoperative.liver.reachable import opened
 from glisson.preoperative.liver.slice_flags import flag_slices
 
 _CONTOUR_RANGE = 3.0
 """The contour sees grey values up to so many half widths of the liver's band: lung would blind it to fat."""
 
-_GAP_MM = 4.0
-_TUMOUR_ROUNDS = 2
-_SMALLEST_ML = 100.0
 _USUAL_ML = (500.0, 4000.0)
 """Volumes of adults' livers; what is outside is shown to a person."""
 
@@ -93,20 +92,24 @@ class SeededContour:
         known = _known_tumours(volume, labels)
         grid = WorkingGrid.of(volume.grid, self._parameters.resolution_mm)
         progress(0.0, "smoothing")
-        smooth, start, seeds_mm = _started(volume, grid, np.asarray(seeds_mm, dtype=np.float64).reshape(-1, 3))
-        clicked = [grid.working_index(index) for index in volume.grid.indices_from_points(seeds_mm)]
+        seeds_mm = np.asarray(seeds_mm, dtype=np.float64).reshape(-1, 3)
+        indices = checked_clicks(volume.grid, seeds_mm)
+        clicked = [grid.working_index(index) for index in indices]
+        smooth = _smoothed(volume, grid, clicked)
         _require_soft_tissue(smooth, clicked, seeds_mm)
-        prior = estimate_prior(smooth, grid.spacing_mm, clicked)
-        if prior is None:
-            raise BadInput("There is no soft tissue about the click; click inside the liver.")
-        progress(0.1, "region about the click")
-        region = _region_with_tumours(smooth, prior, grid.spacing_mm, clicked, grid.working(known) >= 0.5)
-        region = without_gaps(region, smooth, grid.spacing_mm, _GAP_MM)
-        _require_volume(region, grid, seeds_mm)
+        known_here = grid.working(known) >= 0.5
+        progress(0.1, "the organ's region")
+        start, found = found_region(volume, smooth, grid, known_here, clicked)
+        if found is None:
+            found = region_about(smooth, grid.spacing_mm, clicked, known_here)
+            require_volume(found.mask, grid, seeds_mm[0])
+        region, prior = found.mask, found.prior
         organ, flags = self._contoured(smooth, region, prior, grid, progress)
         full = ndimage.binary_fill_holes(grid.full(organ) | known)
         flags += [(border.slice_near(volume.grid), border.sentence) for border in touched_borders(full)]
-        flags += _volume_flag(full, volume.grid) + _start_flags(start, full, volume.grid)
+        flags += _volume_flag(full, volume.grid)
+        if start is not None and not clicked:
+            flags += _start_flags(start, full, volume.grid)
         return Segmentation(LabelMap(full.astype(np.uint8), volume.grid, {1: "liver"}), tuple(sorted(flags)))
 
     def _contoured(
@@ -132,7 +135,7 @@ class SeededContour:
         )
         progress(0.9, "clean-up")
         voxel = float(grid.spacing_mm.max())
-        cleaned = opened(without_gaps(mask, smooth, grid.spacing_mm, _GAP_MM), grid.spacing_mm, voxel)
+        cleaned = opened(without_gaps(mask, smooth, grid.spacing_mm, GAP_MM), grid.spacing_mm, voxel)
         flags = flag_slices(contours, cleaned, smooth, prior, grid)
         return cleaned, flags
 
@@ -147,59 +150,23 @@ def _known_tumours(volume: Volume, labels: LabelMap | None) -> NDArray[np.bool_]
     return labels.mask(*names)
 
 
-def _region_with_tumours(
-    smooth: NDArray[np.float32],
-    prior: IntensityPrior,
-    spacing_mm: FloatArray,
-    clicked: list[tuple[int, int, int]],
-    known: NDArray[np.bool_],
-) -> NDArray[np.bool_]:
-    """The reachable region with known and surface tumours; a tumour may hide liver that lies behind it."""
-    tumours = known
-    region = _reachable_with(tumours, smooth, prior, spacing_mm, clicked)
-    for _ in range(_TUMOUR_ROUNDS):
-        found = surface_tumours(region, smooth, prior, spacing_mm)
-        if not found.any():
-            break
-        tumours = tumours | found
-        region = _reachable_with(tumours, smooth, prior, spacing_mm, clicked)
-    return region
+def _smoothed(volume: Volume, grid: WorkingGrid, clicked: list[Index]) -> NDArray[np.float32]:
+    """Smoothed values (HU, or on their scale) on the working grid.
+
+    Raises:
+        BadInput: an MR without a click.
+    """
+    if volume.modality == "CT":
+        return smoothed_ct(volume, grid)
+    if not clicked:
+        raise BadInput(
+            "In an MR the liver is not found without a click, since its signal has no scale; give --seed-point "
+            "X,Y,Z (LPS mm)."
+        )
+    return smoothed_mr(volume, grid, clicked)
 
 
-def _reachable_with(
-    tumours: NDArray[np.bool_],
-    smooth: NDArray[np.float32],
-    prior: IntensityPrior,
-    spacing_mm: FloatArray,
-    clicked: list[tuple[int, int, int]],
-) -> NDArray[np.bool_]:
-    healed = np.where(tumours, np.float32(prior.mean), smooth)
-    reached = reachable_region(healed, prior, spacing_mm, clicked)
-    return reached | tumours if reached.any() else reached
-
-
-def _started(
-    volume: Volume, grid: WorkingGrid, seeds_mm: FloatArray
-) -> tuple[NDArray[np.float32], Start | None, FloatArray]:
-    """Smoothed values (HU, or on their scale), the start where it was found without a click, and the clicks (n, 3)."""
-    indices = checked_clicks(volume.grid, seeds_mm)
-    if volume.modality != "CT":
-        if len(indices) == 0:
-            raise BadInput(
-                "In an MR the liver is not found without a click, since its signal has no scale; give --seed-point "
-                "X,Y,Z (LPS mm)."
-            )
-        return smoothed_mr(volume, grid, [grid.working_index(index) for index in indices]), None, seeds_mm
-    smooth = smoothed_ct(volume, grid)
-    if len(indices):
-        return smooth, None, seeds_mm
-    start = find_start(smooth, grid, volume.grid)
-    return smooth, start, start.point_mm[None]
-
-
-def _require_soft_tissue(
-    smooth: NDArray[np.float32], clicked: list[tuple[int, int, int]], seeds_mm: FloatArray
-) -> None:
+def _require_soft_tissue(smooth: NDArray[np.float32], clicked: list[Index], seeds_mm: FloatArray) -> None:
     kinds = ((-200.0, "air"), (-30.0, "fat"), (250.0, ""), (np.inf, "bone or contrast agent"))
     for index, seed in zip(clicked, seeds_mm, strict=True):
         kind = next(name for limit, name in kinds if smooth[index] <= limit)
@@ -207,16 +174,6 @@ def _require_soft_tissue(
             raise BadInput(
                 f"The click {place_text(seed)} lies in {kind} ({smooth[index]:.0f} HU); click inside the liver."
             )
-
-
-def _require_volume(region: NDArray[np.bool_], grid: WorkingGrid, seeds_mm: FloatArray) -> None:
-    volume_ml = float(region.sum() * np.prod(grid.spacing_mm)) * 1e-3
-    if volume_ml < _SMALLEST_ML:
-        raise StageFailed(
-            f"Only {volume_ml:.1f} ml of like tissue hang together about the click {place_text(seeds_mm[0])}; "
-            "click in a larger, even part of the liver.",
-            Status.STAGNATED,
-        )
 
 
 def _volume_flag(mask: NDArray[np.bool_], grid: Grid) -> list[tuple[int, str]]:
@@ -229,17 +186,15 @@ def _volume_flag(mask: NDArray[np.bool_], grid: Grid) -> list[tuple[int, str]]:
     return [(largest, f"Unusual volume for a liver: {volume_ml:.0f} ml; parts may be missing, or others included.")]
 
 
-def _start_flags(start: Start | None, mask: NDArray[np.bool_], grid: Grid) -> list[tuple[int, str]]:
+def _start_flags(start: Start, mask: NDArray[np.bool_], grid: Grid) -> list[tuple[int, str]]:
     """Where the liver was taken to be without a click, and where else it might be."""
-    if start is None:
-        return []
     sentence = f"The start was found without a click, at {place_text(start.point_mm)}"
     if start.rival_mm is not None and not mask[_voxel(start.rival_mm, grid)]:
         sentence += f"; an organ at {place_text(start.rival_mm)} is almost as wide: if that is the liver, click into it"
     return [(_voxel(start.point_mm, grid)[slice_axis(grid)], sentence + ".")]
 
 
-def _voxel(point_mm: FloatArray, grid: Grid) -> tuple[int, int, int]:
+def _voxel(point_mm: FloatArray, grid: Grid) -> Index:
     index = np.rint(grid.indices_from_points(point_mm[None])[0]).astype(int)
     i, j, k = np.clip(index, 0, np.array(grid.shape) - 1).tolist()
     return i, j, k
