@@ -6,6 +6,7 @@ from glisson.phantom.family import make_phantom
 from glisson.preoperative.imaging.working_grid import WorkingGrid
 from glisson.preoperative.liver.completion import surface_tumours
 from glisson.preoperative.liver.intensity_prior import IntensityPrior, estimate_prior
+from glisson.preoperative.liver.organ_region import OrganRegion, region_about
 from glisson.preoperative.liver.propagation import SliceContour
 from glisson.preoperative.liver.reachable import reachable_region
 from glisson.preoperative.liver.seeded_contour import SeededContour, SeededContourParameters
@@ -92,6 +93,45 @@ def test_a_dark_body_in_the_surface_is_a_tumour_and_a_neighbour_is_not():
     found = surface_tumours(liver & ~tumour, smooth, IntensityPrior(108.0, 4.0), grid.spacing_mm)
     assert (found & tumour).sum() > 0.9 * tumour.sum()
     assert not (found & neighbour).any()
+
+
+@pytest.mark.parametrize(("thickness", "is_lobe"), [(24.0, True), (7.0, False)])
+def test_behind_a_tumour_lies_a_lobe_or_another_organs_wall(thickness, is_lobe):
+    """Both look like the liver and touch it through the tumour alone."""
+    grid = Grid((110, 50, 50), [1.5, 1.5, 1.5], [-110.0, -37.0, -37.0])
+    liver = mask_of(ellipsoid((0.0, 0.0, 0.0), (40.0, 34.0, 34.0)), grid)
+    tumour = mask_of(ellipsoid((-42.0, 0.0, 0.0), (12.0, 22.0, 22.0)), grid) & ~liver
+    behind = mask_of(ellipsoid((-48.0 - thickness, 0.0, 0.0), (thickness, 30.0, 30.0)), grid) & ~liver & ~tumour
+    smooth = np.select([tumour, liver | behind], [55.0, 108.0], -90.0).astype(np.float32)
+    region = region_about(smooth, grid.spacing_mm, [(73, 25, 25)], tumour)
+    assert (region.mask & liver).sum() > 0.95 * liver.sum()
+    assert region.mask[tumour].all()
+    share = (region.mask & behind).sum() / behind.sum()
+    assert share > 0.9 if is_lobe else share < 0.1
+
+
+def test_it_does_not_matter_where_in_the_liver_a_click_lies(phantom):
+    """Also in a tumour or a vessel; the mask is that without a click."""
+    found = segment(phantom.volume, np.zeros((0, 3))).labels.mask("liver")
+    smooth = np.asarray(phantom.volume.voxels, dtype=np.float32)
+    inside = np.argwhere(phantom.organ.mask("liver"))
+    region = OrganRegion(found, IntensityPrior(110.0, 5.0))
+    clicks = inside[np.random.default_rng(5).integers(len(inside), size=200)]
+    held = [region.holds((int(i), int(j), int(k)), smooth, phantom.volume.grid.spacing_mm) for i, j, k in clicks]
+    assert np.mean(held) > 0.97
+    np.testing.assert_array_equal(segment(phantom.volume, click(phantom, 4)).labels.mask("liver"), found)
+
+
+def test_a_click_into_another_organ_than_the_widest_is_followed():
+    """Two organs apart, the wider one on the right."""
+    grid = Grid((120, 60, 60), [3.0, 3.0, 3.0], [-180.0, -90.0, -90.0])
+    body = mask_of(ellipsoid((0.0, 0.0, 0.0), (172.0, 86.0, 400.0)), grid)
+    wide = mask_of(ellipsoid((-80.0, 0.0, 0.0), (55.0, 55.0, 55.0)), grid)
+    clicked = mask_of(ellipsoid((60.0, 0.0, 0.0), (45.0, 45.0, 45.0)), grid)
+    voxels = np.select([wide | clicked, body], [100, -90], -1000) + np.random.default_rng(3).normal(0, 8, grid.shape)
+    volume = Volume(voxels.astype(np.int16), grid)
+    assert dice(segment(volume, np.zeros((0, 3))).labels.mask("liver"), wide) > 0.95
+    assert dice(segment(volume, np.array([[60.0, 5.0, 10.0]])).labels.mask("liver"), clicked) > 0.95
 
 
 def test_working_grid_goes_there_and_back():
