@@ -6,7 +6,7 @@ from glisson.phantom.family import make_phantom
 from glisson.preoperative.imaging.working_grid import WorkingGrid
 from glisson.preoperative.liver.completion import surface_tumours
 from glisson.preoperative.liver.intensity_prior import IntensityPrior, estimate_prior
-from glisson.preoperative.liver.organ_region import OrganRegion, region_about
+from glisson.preoperative.liver.organ_region import OrganRegion
 from glisson.preoperative.liver.propagation import SliceContour
 from glisson.preoperative.liver.reachable import reachable_region
 from glisson.preoperative.liver.seeded_contour import SeededContour, SeededContourParameters
@@ -93,21 +93,6 @@ def test_a_dark_body_in_the_surface_is_a_tumour_and_a_neighbour_is_not():
     found = surface_tumours(liver & ~tumour, smooth, IntensityPrior(108.0, 4.0), grid.spacing_mm)
     assert (found & tumour).sum() > 0.9 * tumour.sum()
     assert not (found & neighbour).any()
-
-
-@pytest.mark.parametrize(("thickness", "is_lobe"), [(24.0, True), (7.0, False)])
-def test_behind_a_tumour_lies_a_lobe_or_another_organs_wall(thickness, is_lobe):
-    """Both look like the liver and touch it through the tumour alone."""
-    grid = Grid((110, 50, 50), [1.5, 1.5, 1.5], [-110.0, -37.0, -37.0])
-    liver = mask_of(ellipsoid((0.0, 0.0, 0.0), (40.0, 34.0, 34.0)), grid)
-    tumour = mask_of(ellipsoid((-42.0, 0.0, 0.0), (12.0, 22.0, 22.0)), grid) & ~liver
-    behind = mask_of(ellipsoid((-48.0 - thickness, 0.0, 0.0), (thickness, 30.0, 30.0)), grid) & ~liver & ~tumour
-    smooth = np.select([tumour, liver | behind], [55.0, 108.0], -90.0).astype(np.float32)
-    region = region_about(smooth, grid.spacing_mm, [(73, 25, 25)], tumour)
-    assert (region.mask & liver).sum() > 0.95 * liver.sum()
-    assert region.mask[tumour].all()
-    share = (region.mask & behind).sum() / behind.sum()
-    assert share > 0.9 if is_lobe else share < 0.1
 
 
 def test_it_does_not_matter_where_in_the_liver_a_click_lies(phantom):

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from glisson.core.arrays import FloatArray
 from glisson.core.errors import BadInput, StageFailed
@@ -21,9 +20,7 @@ from glisson.preoperative.liver.reachable import reachable_region
 GAP_MM = 4.0
 """Radius of the ball that closes gaps of a mask."""
 
-_LOBE_MM = 12.0
-"""Radius of the ball that a lobe behind a tumour holds at least."""
-
+_TUMOUR_ROUNDS = 2
 _SMALLEST_ML = 100.0
 
 _INTERIOR_MM = 10.0
@@ -91,28 +88,31 @@ def _region_with_tumours(
     smooth: NDArray[np.float32],
     prior: IntensityPrior,
     spacing_mm: FloatArray,
-    places: list[Index],
+    clicked: list[Index],
     known: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
-    """The reachable region with known and surface tumours, and with the lobes that these cut off."""
-    reached = reachable_region(smooth, prior, spacing_mm, places)
-    if not reached.any():
-        return reached
-    tumours = known | surface_tumours(reached | known, smooth, prior, spacing_mm)
-    if not tumours.any():
-        return reached
+    """The reachable region with known and surface tumours; a tumour may hide liver that lies behind it."""
+    tumours = known
+    region = _reachable_with(tumours, smooth, prior, spacing_mm, clicked)
+    for _ in range(_TUMOUR_ROUNDS):
+        found = surface_tumours(region, smooth, prior, spacing_mm)
+        if not found.any():
+            break
+        tumours = tumours | found
+        region = _reachable_with(tumours, smooth, prior, spacing_mm, clicked)
+    return region
+
+
+def _reachable_with(
+    tumours: NDArray[np.bool_],
+    smooth: NDArray[np.float32],
+    prior: IntensityPrior,
+    spacing_mm: FloatArray,
+    clicked: list[Index],
+) -> NDArray[np.bool_]:
     healed = np.where(tumours, np.float32(prior.mean), smooth)
-    behind = reachable_region(healed, prior, spacing_mm, places) & ~reached & ~tumours
-    return reached | tumours | _lobes(behind, spacing_mm)
-
-
-def _lobes(behind: NDArray[np.bool_], spacing_mm: FloatArray) -> NDArray[np.bool_]:
-    """The thick parts of what is reached through tumours alone: these touch other organs, too, as wide as the liver."""
-    cores = ndimage.distance_transform_edt(behind, sampling=spacing_mm) > _LOBE_MM
-    if not cores.any():
-        return cores
-    lobes: NDArray[np.bool_] = behind & (ndimage.distance_transform_edt(~cores, sampling=spacing_mm) < _LOBE_MM + 1.0)
-    return lobes
+    reached = reachable_region(healed, prior, spacing_mm, clicked)
+    return reached | tumours if reached.any() else reached
 
 
 def require_volume(region: NDArray[np.bool_], grid: WorkingGrid, place_mm: FloatArray) -> None:
