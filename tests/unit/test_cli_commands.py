@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from glisson.core.image import LabelMap
 from glisson.framework.case import SCENARIO, SETTINGS, STALE
@@ -245,6 +246,68 @@ def test_a_click_that_cannot_be_applied_changes_nothing(
 ) -> None:
     before = contents(case)
     code, said = glisson("correct", case, *options)
+    assert code == 2
+    assert words in said["message"]
+    assert contents(case) == before
+
+
+def test_drawn_slices_correct_the_mask_and_the_others_follow(case: Path, glisson: Glisson, tmp_path: Path) -> None:
+    """A mask that is too small everywhere; every fifth slice is drawn as it truly is."""
+    glisson("run", case)
+    organ = read_labels(case / "labels/organ.nii.gz")
+    whole = organ.mask("liver")
+    shrunk = ndimage.binary_erosion(whole)
+    write_labels(case / "labels/organ.nii.gz", LabelMap(shrunk.astype(np.uint8), GRID, {1: "liver"}))
+    own = np.flatnonzero(whole.any(axis=(0, 1)))
+    numbers = range(own[0], own[-1] + 1, 5)
+    drawn = np.zeros_like(organ.voxels)
+    drawn[:, :, numbers] = whole[:, :, numbers]
+    write_labels(tmp_path / "drawn.nii.gz", LabelMap(drawn, GRID, {1: "liver"}))
+    code, said = glisson("correct", case, "--suggest", "4", "--slices", tmp_path / "drawn.nii.gz")
+    assert code == 0
+    assert len(set(said["suggested_slices"])) == 4
+    assert not set(said["suggested_slices"]) & set(numbers)
+    assert np.array_equal(read_labels(case / "labels/organ.nii.gz").mask("liver"), shrunk)
+    code, said = glisson("correct", case, "--slices", tmp_path / "drawn.nii.gz")
+    assert code == 0
+    corrected = read_labels(case / "labels/organ.nii.gz").mask("liver")
+    assert np.array_equal(corrected[:, :, numbers], whole[:, :, numbers])
+    assert (corrected ^ whole).sum() < 0.3 * (shrunk ^ whole).sum()
+    assert said["volume_before_ml"] < said["volume_ml"]
+    assert "mesh" in (case / STALE).read_text()
+
+
+def test_only_slices_that_are_named_are_taken_from_a_drawn_mask(case: Path, glisson: Glisson, tmp_path: Path) -> None:
+    """An empty one among them says that the liver is not in it."""
+    glisson("run", case)
+    whole = read_labels(case / "labels/organ.nii.gz").mask("liver")
+    last = int(np.flatnonzero(whole.any(axis=(0, 1)))[-1])
+    drawn = whole.copy()
+    drawn[:, :, last] = False
+    write_labels(tmp_path / "drawn.nii.gz", LabelMap(drawn.astype(np.uint8), GRID, {1: "liver"}))
+    assert glisson("correct", case, "--slices", tmp_path / "drawn.nii.gz", "--numbers", f"{last - 4},{last}")[0] == 0
+    corrected = read_labels(case / "labels/organ.nii.gz").mask("liver")
+    assert not corrected[:, :, last].any()
+    assert np.array_equal(corrected[:, :, : last - 4], whole[:, :, : last - 4])
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--slices", "empty.nii.gz"], "is empty; draw the liver"),
+        (["--slices", "empty.nii.gz", "--numbers", "2,x"], "K,K,K"),
+        (["--slices", "empty.nii.gz", "--numbers", "900"], "no slice 900"),
+        (["--slices", "empty.nii.gz", "--add", "30,0,6"], "one after the other"),
+        (["--numbers", "3"], "give that mask with --slices"),
+        (["--suggest", "0"], "1 or more"),
+    ],
+)
+def test_drawn_slices_that_cannot_be_used_change_nothing(
+    case: Path, glisson: Glisson, tmp_path: Path, options: list[str], words: str
+) -> None:
+    write_labels(tmp_path / "empty.nii.gz", LabelMap(np.zeros(GRID.shape, dtype=np.uint8), GRID, {1: "liver"}))
+    before = contents(case)
+    code, said = glisson("correct", case, *(tmp_path / o if o.endswith(".gz") else o for o in options))
     assert code == 2
     assert words in said["message"]
     assert contents(case) == before

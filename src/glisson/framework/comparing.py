@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glisson.core.errors import BadInput
+from glisson.core.image import Grid
 from glisson.framework.case import ORGAN, VESSELS, Case
 from glisson.framework.segmentation_scores import SegmentationScores, centreline_dice, segmentation_scores
 from glisson.io.images import read_label_maps, read_labels
@@ -22,15 +23,28 @@ def compare_with_reference(case: Case, path: str | Path) -> SegmentationScores:
         BadInput: the mask cannot be read, has several labels and none is the liver, or lies on another grid.
     """
     found = read_labels(case.path(ORGAN))
+    return segmentation_scores(found.mask(LIVER), liver_mask(path, found.grid, "the reference"), found.grid)
+
+
+def liver_mask(path: str | Path, grid: Grid, what: str) -> NDArray[np.bool_]:
+    """The liver [i, j, k] of a label map with "liver", or of one with a single label, on a scan's grid.
+
+    Args:
+        path: a file, or a DICOM folder.
+        grid: the scan's.
+        what: what it is, for the sentence ("the reference").
+
+    Raises:
+        BadInput: it cannot be read, has several labels and none is the liver, or lies on another grid.
+    """
     maps = read_label_maps(path)
     named = next((labels for labels in maps if LIVER in labels.names.values()), None)
     if named is None and len(maps) == 1 and len(maps[0].names) == 1:
         named = maps[0]
     if named is None:
-        raise BadInput(f"The reference {path} has no label {LIVER!r}; give a mask of the liver alone.")
-    named = on_grid_of(found.grid, named, f"the reference {path}")
-    label = LIVER if LIVER in named.names.values() else next(iter(named.names.values()))
-    return segmentation_scores(found.mask(LIVER), named.mask(label), found.grid)
+        raise BadInput(f"{what.capitalize()} {path} has no label {LIVER!r}; give a mask of the liver alone.")
+    named = on_grid_of(grid, named, f"{what} {path}")
+    return named.mask(LIVER if LIVER in named.names.values() else next(iter(named.names.values())))
 
 
 def given_mask_facts(case: Case) -> dict[str, Any]:

@@ -16,6 +16,9 @@ from glisson.preoperative.imaging.working_grid import WorkingGrid
 
 _RESOLUTION_MM = 1.6
 
+_MARGIN = 4
+"""Working voxels about what changed that are looked at, for the interpolation."""
+
 
 @dataclass(frozen=True)
 class Click:
@@ -70,6 +73,17 @@ class ClickedMask:
             after = without_piece(before, spacing, place, self._kept)
             if not after.any():
                 raise BadInput(f"The click {where} would take away all of the organ.")
-        # The working mask is coarser, so it counts only where it changed, with a voxel about that for the border.
-        changed = self._grid.full(ndimage.binary_dilation(before ^ after))
-        self._mask = np.where(changed, self._grid.full(after), self._mask)
+        self._take_over(before ^ after, after)
+
+    def _take_over(self, changed: NDArray[np.bool_], after: NDArray[np.bool_]) -> None:
+        """Put what changed on the working grid into the mask; all else stays, since the working mask is coarser."""
+        if not changed.any():
+            return
+        found = ndimage.find_objects(changed.astype(np.uint8))[0]
+        low = [max(extent.start - _MARGIN, 0) for extent in found]
+        high = [min(extent.stop + _MARGIN, count) for extent, count in zip(found, changed.shape, strict=True)]
+        box = tuple(slice(a, b) for a, b in zip(low, high, strict=True))
+        part, place = self._grid.part(low, high)
+        # A voxel about what changed belongs to its border.
+        concerned = part.full(ndimage.binary_dilation(changed[box]))
+        self._mask[place] = np.where(concerned, part.full(after[box]), self._mask[place])

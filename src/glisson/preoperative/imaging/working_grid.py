@@ -1,5 +1,6 @@
 """A scan brought to a resolution and axis order in which segmentation is quick, and masks brought back."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,6 +57,15 @@ class WorkingGrid:
         """The scan's slice numbers that a working slice stands for."""
         factor = self.factors[2]
         return range(working_slice * factor, min((working_slice + 1) * factor, self.shape[2]))
+
+    def part(self, low: Sequence[int], high: Sequence[int]) -> tuple["WorkingGrid", tuple[slice, ...]]:
+        """The grid of working voxels from `low` (3,) to before `high` (3,), and its place in the scan [i, j, k]."""
+        first = np.array(low) * self.factors
+        last = np.minimum(np.array(high) * self.factors, self.shape)
+        a, b, c = (last - first).tolist()
+        turned = [slice(int(x), int(y)) for x, y in zip(first, last, strict=True)]
+        place = tuple(turned[axis] for axis in np.argsort(self.order))
+        return WorkingGrid(self.order, self.factors, (a, b, c), self.spacing_mm), place
 
     def full(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """A working mask on the scan's grid [i, j, k], its border interpolated linearly."""
