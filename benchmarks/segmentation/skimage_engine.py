@@ -42,7 +42,7 @@ def morphological_geodesic(problem: Problem) -> Found:
     """A balloon that stops at edges, by morphological operators."""
     edges = inverse_gaussian_gradient(_scaled(problem), alpha=100.0, sigma=1.5)
     found = morphological_geodesic_active_contour(
-        edges, ITERATIONS, init_level_set=problem.start, smoothing=1, threshold=0.4, balloon=1
+        edges, ITERATIONS, init_level_set=problem.start, smoothing=1, threshold=0.55, balloon=1
     )
     return Found(found > 0, ITERATIONS)
 

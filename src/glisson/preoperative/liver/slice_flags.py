@@ -3,9 +3,10 @@
 Some of it is told by the contours: that one stood still, wanted to leave the organ, or was changed much by the
 clean-up. The rest is seen in the mask itself, however it was made. An organ goes on from slice to slice, so what
 is there, or is not, for a few slices only is suspicious: a leak comes and goes, a contour that stalled or missed a
-tumour leaves a gap between the slices above and below (the residues of opening and closing by a line along the
-slices' axis; Serra 1982), if the gap holds tissue and no fat. A part of other grey values is a vessel or a tumour where the
-organ encloses it, and else a neighbour. And where much of the surroundings looks like the organ, its border was guessed.
+tumour leaves a gap between the slices above and below, if the gap holds tissue and no fat (the residues of opening
+and closing by a line along the slices' axis; Serra 1982). A part of other grey values is a vessel or a tumour where
+the organ encloses it, and else a neighbour. And where much of the surroundings looks like the organ, its border was
+guessed.
 """
 
 from collections import defaultdict

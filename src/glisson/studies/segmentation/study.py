@@ -112,7 +112,7 @@ def _scores(rows: Sequence[Mapping[str, Any]], modality: str, start: str) -> dic
 
 
 def _recall(rows: Sequence[Mapping[str, Any]], kind: str | None) -> dict[str, Any]:
-    """Shares of slices over all failures of a kind, or of all kinds; `noticed` counts failures with any slice flagged."""
+    """Shares of slices over failures of a kind, or all; `noticed` counts failures with any slice flagged."""
     here = [row for row in rows if kind in (None, row["failure"])]
 
     def total(name: str) -> int:

@@ -22,11 +22,11 @@ def as_lines(values: Mapping[str, Any]) -> list[str]:
                 tail = "5th" if name == "dice" else "95th"
                 lines.append(
                     f"{group['modality']}, {group['start']:9} {words:10} median {spread['median']:.{digits}f}, {tail} "
-                    f"percentile {spread['tail']:.{digits}f}, worst {spread['worst']:.{digits}f} ({group['cases']} scans)"
+                    f"percentile {spread['tail']:.{digits}f}, worst {spread['worst']:.{digits}f}"
                 )
     lines += [
         f"flags     {found['failure']:15} {100.0 * found['recall']:.1f} % of {found['failed_slices']} failed slices, "
-        f"{found['noticed']} of {found['failures']} failures, {100.0 * found['good_flagged_share']:.1f} % of good slices"
+        f"{found['noticed']} of {found['failures']} failures; {100.0 * found['good_flagged_share']:.1f} % of good ones"
         for found in values["flags"]
         if found["recall"] is not None and found["good_flagged_share"] is not None
     ]
