@@ -107,7 +107,7 @@ def test_working_grid_goes_there_and_back():
 
 
 def test_slices_that_look_wrong_are_flagged_with_reasons():
-    grid = WorkingGrid((0, 1, 2), (1, 1, 2), (60, 60, 10), np.ones(3))
+    grid = WorkingGrid((0, 1, 2), (1, 1, 2), (60, 60, 14), np.ones(3))
     disc = np.hypot(*np.meshgrid(np.arange(60) - 30.0, np.arange(60) - 30.0)) < 20.0
     mask = np.repeat(disc[:, :, None], 7, axis=2)
     mask[:, :, [0, 6]] = False
