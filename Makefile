@@ -34,6 +34,7 @@ bench: $(VENV)/.ready
 	PYTHON=$(PYTHON) UV=$(BIN)/uv bash benchmarks/environments.sh
 	$(BIN)/glisson benchmark solver
 	$(BIN)/glisson benchmark lift
+	$(BIN)/glisson benchmark segmentation
 
 verify: $(VENV)/.ready
 	$(BIN)/glisson verify

@@ -1,4 +1,4 @@
-"""What an engine's script tells of its solve: OUT.npz gets its displacement, OUT.json what was measured."""
+"""What an engine's script tells of its work: OUT.npz gets its answer, OUT.json what was measured."""
 
 import json
 import os
@@ -25,10 +25,17 @@ class Failed(Exception):
 def write(out: Path, version: str, solution: Solution, seconds: float, before_mb: float, peak: float) -> None:
     """Write OUT.npz and OUT.json."""
     np.savez(out.with_suffix(".npz"), displacement=solution.displacement)
+    write_measured(out, version, solution.iterations, seconds, before_mb, peak)
+
+
+def write_measured(
+    out: Path, version: str, iterations: int | None, seconds: float, before_mb: float, peak: float
+) -> None:
+    """Write OUT.json; `iterations` is None where an engine doesn't tell."""
     values = {
         "version": version,
         "seconds": seconds,
-        "iterations": solution.iterations,
+        "iterations": iterations,
         "memory_mb": peak,
         "memory_before_mb": before_mb,
     }

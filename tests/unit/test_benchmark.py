@@ -10,6 +10,7 @@ import pytest
 
 import glisson as package
 from conftest import ROOT
+from glisson.cli.benchmark import _tables as tables
 from glisson.core.errors import BadInput
 from glisson.core.protocols import silent
 from glisson.framework import benchmark
@@ -301,3 +302,58 @@ def test_a_lift_satisfies_its_judge_and_a_wrong_one_does_not(scripts, tmp_path, 
     assert good["moved_mm"] > 10.0
     assert (good["difference"], none["residual"]) == (0.0, None)
     assert bad["residual"] > 1e-3
+
+
+def test_masks_without_a_tolerance_are_told_with_their_dice(pretended, tmp_path):
+    text = (pretended / "engines.toml").read_text().replace("tolerance = 1e-6", "")
+    (pretended / "engines.toml").write_text(text.replace("T4", "pixels"))
+    (pretended / "judge.py").write_text(
+        "import json, pathlib, sys\n"
+        "pathlib.Path(sys.argv[2]).write_text(json.dumps([{'dice': 0.9, 'difference': 1.5}] * len(sys.argv[3:])))"
+    )
+    rows = Benchmark("solver", tmp_path / "out", quick=True).run()
+    assert [(row.engine, row.dice, row.difference, row.seconds) for row in rows][:2] == [
+        ("exact", 0.9, 1.5, 27.0),
+        ("rough", 0.9, 1.5, 27.0),
+    ]
+    assert "Dice" in "\n".join(tables(rows))
+
+
+def test_engines_find_the_liver_of_a_small_slice(scripts, tmp_path):
+    """All but SimpleITK's geodesic contour, which leaks here, come nearer to the liver than the start."""
+    scripts("segmentation")
+    from glisson_engine import localized
+    from judge import judge
+    from meshes import main
+    from problem import ITERATIONS, load_problem
+    from simpleitk_engine import geodesic, threshold
+    from skimage_engine import global_chan_vese, morphological_geodesic, morphological_global
+
+    main(128 * 128, "pixels", tmp_path / "slice.npz")
+    problem = load_problem(tmp_path / "slice.npz")
+    (start, far) = judge(problem, [problem.start, np.zeros_like(problem.truth)])
+    assert (far["dice"], far["difference"]) == (0.0, None)
+    ours = judge(problem, [localized(problem, "uniform").mask])[0]["dice"]
+    assert ours >= 0.95
+    for method in (global_chan_vese, morphological_global, morphological_geodesic, threshold):
+        found = judge(problem, [method(problem).mask])[0]
+        assert found["dice"] > start["dice"], method.__name__
+    leaked = geodesic(problem)
+    assert (leaked.mask >= problem.start).all()
+    assert 0 < leaked.iterations <= ITERATIONS
+
+
+def test_the_judge_of_masks_against_a_disc(scripts):
+    """A disc within a disc: Dice is 2 a / (a + b) of their areas; another part far away does not count."""
+    scripts("segmentation")
+    from adapter import tiny_problem
+    from judge import judge
+
+    problem = tiny_problem(2)
+    found = problem.start.copy()
+    found[0, 0] = True
+    (scores,) = judge(problem, [found])
+    inner, outer = problem.start.sum(), problem.truth.sum()
+    assert scores["dice"] == pytest.approx(2.0 * inner / (inner + outer))
+    assert scores["difference"] == pytest.approx(6.0, abs=0.75)
+    assert judge(problem, [problem.truth])[0] == {"dice": 1.0, "difference": 0.0}

@@ -107,19 +107,22 @@ def test_working_grid_goes_there_and_back():
 
 
 def test_slices_that_look_wrong_are_flagged_with_reasons():
-    grid = WorkingGrid((0, 1, 2), (1, 1, 2), (60, 60, 10), np.ones(3))
+    grid = WorkingGrid((0, 1, 2), (1, 1, 2), (60, 60, 14), np.ones(3))
     disc = np.hypot(*np.meshgrid(np.arange(60) - 30.0, np.arange(60) - 30.0)) < 20.0
-    mask = np.repeat(disc[:, :, None], 5, axis=2)
-    mask[30:, :, 2] = False
+    mask = np.repeat(disc[:, :, None], 7, axis=2)
+    mask[:, :, [0, 6]] = False
     smooth = np.where(mask, 110.0, -90.0).astype(np.float32)
-    smooth[:, :, 4] = 110.0
+    mask[30:, :, 2] = False
+    smooth[:, :, 5] = 110.0
     area = float(disc.sum())
-    contours = {k: SliceContour(area, area, 0.5, 0.0, True) for k in range(5)}
+    contours = {k: SliceContour(area, area, 0.5, 0.0, True) for k in range(1, 6)}
     contours[1] = SliceContour(area, area, 0.5, 0.6, True)
     contours[3] = SliceContour(area, area, 0.01, 0.0, True)
-    flags = dict(flag_slices(contours, mask, smooth, IntensityPrior(110.0, 4.0), grid))
-    assert "leak suspected: 60 %" in flags[2].lower()
-    assert "area jump" in flags[4].lower()
-    assert "stalled" in flags[6].lower()
-    assert "faint border" in flags[8].lower()
-    assert 0 not in flags
+    contours[4] = SliceContour(area, 2.0 * area, 0.5, 0.0, True)
+    flags = {k: why.lower() for k, why in flag_slices(contours, mask, smooth, IntensityPrior(110.0, 4.0), grid)}
+    assert "leak suspected: 60 %" in flags[2]
+    assert "are absent that are there above and below" in flags[4]
+    assert "stalled: the contour moved" in flags[6]
+    assert "clean-up changed the area" in flags[8]
+    assert "faint border" in flags[10]
+    assert not {0, 12} & set(flags)

@@ -13,15 +13,16 @@ from glisson.framework.benchmark import RESULTS, Benchmark, Row
 from glisson.framework.benchmark_plot import PLOT, draw_cost
 
 _OURS = "Glisson"
+_MASK_HEADING = "  engine                       seconds  ratio  its     MB    Dice  difference"
 _HEADING = "  engine                  seconds  ratio  its     MB  residual difference  moved (mm)"
 
 
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "benchmark",
-        choices=("solver", "lift"),
+        choices=("solver", "lift", "segmentation"),
         help="solver: the same hyperelastic problem on the same meshes by Glisson and by other engines; "
-        "lift: the two-stage lever lift with friction",
+        "lift: the two-stage lever lift with friction; segmentation: the liver of a phantom by contours",
     )
     parser.add_argument("--quick", action="store_true", help="one small problem instead of all; some minutes")
     parser.add_argument("--out", metavar="DIR", help="where results go (default: studies/benchmark-NAME)")
@@ -42,7 +43,7 @@ def _tables(rows: Sequence[Row]) -> Iterator[str]:
         measured = sorted(group, key=lambda row: (row.seconds is None, row.seconds or 0.0))
         peers = [row.seconds for row in measured if row.seconds is not None and not row.engine.startswith(_OURS)]
         yield f"{elements:,} {element}"
-        yield _HEADING
+        yield _HEADING if all(row.dice is None for row in measured) else _MASK_HEADING
         yield from (f"  {_line(row, peers[0] if peers else None)}" for row in measured)
 
 
@@ -51,6 +52,11 @@ def _line(row: Row, fastest: float | None) -> str:
         return f"{row.engine:22s} {'–':>8s}  {row.reason}"
     ratio = "–" if fastest is None else f"{row.seconds / fastest:.2f}"
     memory, residual, difference = row.memory_mb or 0.0, row.residual or 0.0, row.difference or 0.0
+    if row.dice is not None:
+        return (
+            f"{row.engine:27s} {row.seconds:8.2f} {ratio:>6s} {row.iterations or '–':>4} {memory:6.0f} "
+            f"{row.dice:7.4f} {difference:11.2f}"
+        )
     moved = "" if row.moved_mm is None else f"{row.moved_mm:11.2f}"
     return (
         f"{row.engine:22s} {row.seconds:8.2f} {ratio:>6s} {row.iterations or '–':>4} {memory:6.0f} "

@@ -16,6 +16,7 @@ from glisson.studies.executor import Executor
 from glisson.studies.lift_robustness.study import LiftRobustness
 from glisson.studies.local_pool import LocalPool
 from glisson.studies.region.study import RegionStudy
+from glisson.studies.segmentation.study import SegmentationStudy
 from glisson.studies.sensitivity.study import Sensitivity
 from glisson.studies.study import Study, run_study
 
@@ -24,6 +25,7 @@ STUDIES = {
     "elements": "how much error linear and quadratic elements leave in the same time",
     "lift-robustness": "whether the lever lift converges whatever liver, lever, tissue and contact",
     "region": "how much faster a lift is by its region of interest, and what that costs",
+    "segmentation": "how well the liver is found in scans of the phantom family, and whether failures are flagged",
     "sensitivity": "how much mesh, law, stiffness, compressibility and contact move the tumour's place",
 }
 
@@ -80,6 +82,8 @@ def _study(arguments: argparse.Namespace) -> Study:
         return Elements.of(arguments.quick)
     if arguments.study == RegionStudy.name:
         return RegionStudy.of(arguments.quick)
+    if arguments.study == SegmentationStudy.name:
+        return SegmentationStudy.of(arguments.quick)
     return Sensitivity.of(arguments.quick, arguments.long, arguments.element or "T10")
 
 

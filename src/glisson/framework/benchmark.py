@@ -45,7 +45,8 @@ class Row:
     """One engine on one mesh of (about) `elements`; where it gave no answer `seconds` is None and `reason` says why.
 
     `memory_mb` is the most that the process had, `memory_before_mb` what it had before the solve. `residual` and
-    `difference` are the neutral judge's, which also tells how far a lift has moved the tumour.
+    `difference` are the neutral judge's, which also tells how far a lift has moved the tumour, and the Dice of a mask.
+    `element` is what there are so many of: elements of a kind, or pixels or voxels.
     """
 
     engine: str
@@ -60,16 +61,20 @@ class Row:
     residual: float | None = None
     difference: float | None = None
     moved_mm: float | None = None
+    dice: float | None = None
     reason: str | None = None
 
 
 @dataclass(frozen=True)
 class _Plan:
-    """The problems as (element, elements), the engines, the residual an answer may have, and more of `engines.toml`."""
+    """The problems as (element, elements), the engines, the residual an answer may have, and more of `engines.toml`.
+
+    Without a `tolerance` every answer counts.
+    """
 
     problems: tuple[tuple[str, int], ...]
     engines: tuple[Engine, ...]
-    tolerance: float
+    tolerance: float | None
     difference: str
     mesh_source: tuple[str, ...]
 
@@ -162,7 +167,7 @@ class Benchmark:
 
     def _accepted(self, row: Row) -> Row:
         """The row without its seconds where the answer is not one."""
-        if row.residual is not None and row.residual <= self._plan.tolerance:
+        if self._plan.tolerance is None or (row.residual is not None and row.residual <= self._plan.tolerance):
             return row
         found = "not a number" if row.residual is None else f"{row.residual:.1e}"
         reason = f"its answer's residual is {found}, which is more than {self._plan.tolerance:.0e}"
@@ -199,5 +204,5 @@ def _read_plan(folder: Path, quick: bool) -> _Plan:
     ]
     engines = [Engine(**(engine | {"command": tuple(engine["command"])})) for engine in values["engines"]]
     return _Plan(
-        tuple(problems), tuple(engines), values["tolerance"], values["difference"], tuple(values["mesh_source"])
+        tuple(problems), tuple(engines), values.get("tolerance"), values["difference"], tuple(values["mesh_source"])
     )

@@ -43,12 +43,16 @@ def draw_cost(rows: Iterable[Row], path: Path) -> None:
     figure, (left, right) = plt.subplots(1, 2, figsize=(13.0, 7.5), layout="constrained")
     engines = list(dict.fromkeys(engine for engine, _ in curves))
     for (engine, element), measured in curves.items():
-        style = {"color": f"C{engines.index(engine)}", "linestyle": "-" if element == "T4" else "--", "marker": "o"}
+        style = {
+            "color": f"C{engines.index(engine)}",
+            "linestyle": "-" if element in ("T4", "pixels") else "--",
+            "marker": "o",
+        }
         sizes = [float(row.elements) for row in measured]
         _curve(left, f"{engine}, {element}", sizes, [float(row.seconds or 0.0) for row in measured], style)
         _curve(right, f"{engine}, {element}", sizes, [float(row.memory_mb or 0.0) for row in measured], style)
     for axes, title, unit in ((left, "Whole solve", "seconds"), (right, "Largest memory of the process", "MB")):
-        axes.set(title=title, xlabel="elements", ylabel=unit, xscale="log", yscale="log")
+        axes.set(title=title, xlabel="elements, pixels or voxels", ylabel=unit, xscale="log", yscale="log")
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_formatter(StrMethodFormatter("{x:,g}"))
             axis.set_minor_formatter(NullFormatter())

@@ -1,0 +1,1 @@
+"""How well the liver is found in scans of the phantom family, and whether failures are flagged."""
