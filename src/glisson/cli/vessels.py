@@ -2,6 +2,7 @@
 
 import argparse
 import time
+from collections.abc import Mapping
 from typing import Any
 
 from glisson.cli.command import Command
@@ -39,7 +40,7 @@ def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
     return Answer(values, "\n".join(text))
 
 
-def _system(name: str, facts: dict[str, Any]) -> str:
+def _system(name: str, facts: Mapping[str, Any]) -> str:
     own = [length for tree, length in facts["length_mm"].items() if tree.partition(" ")[0] == name]
     lines = f", {sum(own):.0f} mm of centreline in {len(own)} tree{'' if len(own) == 1 else 's'}" if own else ""
     return f"{name:9s} {facts['volume_ml'][name]:.1f} ml{lines}"

@@ -31,4 +31,5 @@ class Landmarks:
             BadInput: there is none.
         """
         self.require((name,))
-        return self.points_mm[name].mean(axis=0)
+        middle: FloatArray = self.points_mm[name].mean(axis=0)
+        return middle

@@ -39,7 +39,7 @@ class DrawnSlices:
                 raise BadInput(f"There is no slice {number}; the scan's are 0 to {slices.shape[2] - 1}.")
         spacing = np.append(np.delete(grid.spacing_mm, self._axis), grid.spacing_mm[self._axis])
         whole = np.moveaxis(automatic, self._axis, 2)
-        self._box = _box_of((whole | slices).any(axis=2), np.ceil(_MARGIN_MM / spacing).astype(int))
+        self._box = _box_of(np.any(whole | slices, axis=2), np.ceil(_MARGIN_MM / spacing).astype(int))
         self._correcting = Correcting(whole[self._box], spacing)
         for number in numbers:
             self._correcting.correct(number, slices[self._box][:, :, number])

@@ -181,7 +181,7 @@ def _foreign(
     # Only what is in the mask counts, or its border's partial volumes would.
     inside = np.where(mask, np.clip(smooth, prior.mean - reach, prior.mean + reach), np.float32(prior.mean))
     calm = ndimage.gaussian_filter(inside, _CALM_MM / spacing_mm)
-    other = mask & (np.abs(calm - prior.mean) > prior.half_width)
+    other: NDArray[np.bool_] = mask & (np.abs(calm - prior.mean) > prior.half_width)
     for k in range(mask.shape[2]):
         other[:, :, k] = _reached(other[:, :, k], spacing_mm, _FOREIGN_RADIUS_MM)
     parts, _ = ndimage.label(other)

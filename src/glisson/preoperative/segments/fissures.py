@@ -32,7 +32,7 @@ RIGHT_ACROSS, LEFT_ACROSS = (BIFURCATION, RIGHT_PORTAL), (UMBILICAL, LEFT_PORTAL
 
 _LEFTWARD, _BACKWARD, _CRANIAL = np.eye(3)
 # A right hepatic vein that runs backwards has the segments 5 and 8 before it rather than left of it.
-_MEDIAL = {RIGHT: np.array([0.3, -1.0, 0.0]), MIDDLE: _LEFTWARD, LEFT: _LEFTWARD}
+_MEDIAL: dict[tuple[str, ...], FloatArray] = {RIGHT: np.array([0.3, -1.0, 0.0]), MIDDLE: _LEFTWARD, LEFT: _LEFTWARD}
 _LEAST_SINE = 0.1
 
 

@@ -104,7 +104,8 @@ def _without_tumour(
     if not around.tumours:
         return None
     tumour = around.tumours[int(random.integers(len(around.tumours)))]
-    return mask & (ndimage.distance_transform_edt(~tumour, sampling=around.spacing_mm) > _COVER_MM)
+    kept: NDArray[np.bool_] = ndimage.distance_transform_edt(~tumour, sampling=around.spacing_mm) > _COVER_MM
+    return mask & kept
 
 
 def _shifted(mask: NDArray[np.bool_], around: Surroundings, random: np.random.Generator) -> NDArray[np.bool_]:
