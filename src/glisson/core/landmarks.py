@@ -31,4 +31,5 @@ class Landmarks:
             BadInput: there is none.
         """
         self.require((name,))
-        return self.points_mm[name].mean(axis=0)
+        point: FloatArray = self.points_mm[name].mean(axis=0)
+        return point
