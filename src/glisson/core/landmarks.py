@@ -31,5 +31,5 @@ class Landmarks:
             BadInput: there is none.
         """
         self.require((name,))
-        middle: FloatArray = self.points_mm[name].mean(axis=0)
-        return middle
+        point: FloatArray = self.points_mm[name].mean(axis=0)
+        return point

@@ -36,7 +36,7 @@ _MEDIAL: dict[tuple[str, ...], FloatArray] = {RIGHT: np.array([0.3, -1.0, 0.0]),
 _LEAST_SINE = 0.1
 
 
-def fissure(landmarks: Landmarks, names: tuple[str, ...], towards_right_mm: float = 0.0) -> Plane:
+def fissure(landmarks: Landmarks, names: tuple[str, str, str], towards_right_mm: float = 0.0) -> Plane:
     """The plane through three landmarks; its normal points to the patient's left, that of the right fissure forward.
 
     It is moved against its normal by `towards_right_mm`.
