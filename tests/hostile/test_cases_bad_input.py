@@ -225,9 +225,8 @@ def test_a_mesh_that_cannot_be_made(tmp_path: Path, refused: Refused) -> None:
     ],
 )
 def test_a_material_out_of_range(meshed: Path, refused: Refused, line: str, words: str) -> None:
-    key = line.partition(" = ")[0]
-    lines = (meshed / SETTINGS).read_text().splitlines()
-    (meshed / SETTINGS).write_text("\n".join(line if entry.startswith(f"{key} =") else entry for entry in lines))
+    preset = '\npreset = "human-liver"\n'
+    (meshed / SETTINGS).write_text((meshed / SETTINGS).read_text().replace(preset, f"{preset}{line}\n"))
     message = refused(meshed, 2, "run", meshed)
     assert words in message
     assert "jelly" in message or "materials.liver" in message

@@ -198,7 +198,7 @@ def test_an_attachment_without_nodes_says_where_the_organ_is():
 @pytest.mark.parametrize(
     ("table", "sentence"),
     [
-        ({"kind": "rope"}, "kind of an attachment must be one of"),
+        ({"kind": "rope"}, "kind must be one of"),
         ({"kind": "box", "low_mm": [0, 0, 0]}, "needs"),
         ({"kind": "box", "low_mm": [0, 0, 5], "high_mm": [1, 1, 1]}, "needs low_mm below high_mm"),
         ({"directions": ["up"]}, "needs directions among"),

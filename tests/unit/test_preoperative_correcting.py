@@ -49,13 +49,13 @@ def test_a_leak_and_a_gap_that_corrections_show_are_mended_between(automatic):
 
 
 def test_what_no_correction_shows_is_held_in_check():
-    """A leak between two corrections gets no farther than an outline may bend: 0.4 mm for each mm to the nearer one."""
+    """A leak between two corrections gets no farther than an outline may bend: 0.8 mm for each mm to the nearer one."""
     true = cone(0.0)
     mask = corrected(with_leak(true, slice(18, 23)), true, [10, 30]).mask
     away = np.hypot(ROWS - 39.7, COLUMNS - 40.2) - 28.0
     for number in range(18, 23):
         apart = SPACING[2] * min(number - 10, 30 - number)
-        assert away[:, :, number][mask[:, :, number]].max() < 0.4 * apart + 1.0
+        assert away[:, :, number][mask[:, :, number]].max() < 0.8 * apart + 1.0
 
 
 def test_where_the_automatic_mask_is_right_it_stays():

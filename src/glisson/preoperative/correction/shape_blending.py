@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from glisson.core.arrays import FloatArray
 from glisson.preoperative.contours.signed_distance import signed_distance_of_mask
 
-_BEND = 0.4
+_BEND = 0.8
 """How far an outline may lie from the blend of the corrected ones, for each mm to the nearer of them …"""
 
 _LEAST_BEND_MM = 1.5

@@ -49,21 +49,22 @@ def smoothed_mr(volume: Volume, grid: WorkingGrid, clicks: Sequence[Index]) -> N
     Raises:
         BadInput: a click lies in air.
     """
-    even = _without_bias(grid.working(volume.voxels), grid.spacing_mm)
+    uneven = grid.working(volume.voxels)
+    near = [distance_from(click, uneven.shape, grid.spacing_mm) <= _LOOK_MM for click in clicks]
+    _refuse_air(near, ndimage.gaussian_filter(uneven, 1.5 / grid.spacing_mm))
+    even = _without_bias(uneven, grid.spacing_mm)
     calm = ndimage.gaussian_filter(even, 1.5 / grid.spacing_mm)
-    near = [calm[distance_from(click, calm.shape, grid.spacing_mm) <= _LOOK_MM] for click in clicks]
-    _refuse_air(near, calm)
-    signal = max(float(np.median(np.concatenate(near))), 1e-6)
+    signal = max(float(np.median(np.concatenate([calm[place] for place in near]))), 1e-6)
     values = _LIVER_HU + _HU_PER_FRACTION * (even / signal - 1.0)
     scaled = np.where(calm < _LITTLE * signal, _FAT_HU, values).astype(np.float32)
     return smoothed(scaled, grid.spacing_mm)
 
 
-def _refuse_air(near: Sequence[NDArray[np.float32]], calm: NDArray[np.float32]) -> None:
-    """Refuse clicks whose surroundings have hardly any of the body's signal."""
+def _refuse_air(near: Sequence[NDArray[np.bool_]], calm: NDArray[np.float32]) -> None:
+    """Refuse clicks whose surroundings have hardly any of the body's signal; an estimated field is wild in air."""
     body = float(np.median(calm[calm >= threshold_otsu(calm)]))
-    for values in near:
-        if (signal := float(np.median(values))) <= _AIR * body:
+    for place in near:
+        if (signal := float(np.median(calm[place]))) <= _AIR * body:
             raise BadInput(
                 f"A click lies in air: the signal there is {100.0 * signal / max(body, 1e-6):.0f} % of the body's; "
                 "click inside the liver."
