@@ -64,7 +64,9 @@ def _techniques() -> Iterator[Finding]:
         ours = listing.package == "glisson"
         trouble = listing.broken or (f"needs {', '.join(listing.missing)}" if listing.missing else "")
         where = "" if ours else f" (of {listing.package})"
-        yield Finding(f"{listing.kind} {listing.name}", not trouble, (trouble or "ready") + where, needed=ours)
+        # What Glisson itself needs is among the packages; techniques that bring in another program are extras.
+        needed = ours and not listing.missing
+        yield Finding(f"{listing.kind} {listing.name}", not trouble, (trouble or "ready") + where, needed=needed)
 
 
 def _mkl() -> Finding:
