@@ -94,6 +94,9 @@ def _failure(error: BaseException, stage: str | None, command: Command | None) -
     status: Status | None = None
     exit_code = 1
     message = str(error)
+    if isinstance(error, SystemError) and isinstance(error.__cause__, KeyboardInterrupt):
+        error = error.__cause__  # Ctrl-C in compiled code comes as "returned a result with an exception set"
+        message = str(error)
     if isinstance(error, KeyboardInterrupt):
         where = "" if stage is None else f" in the stage {stage}; what was done before it is kept"
         message, exit_code = message or f"Interrupted{where}.", _INTERRUPTED
