@@ -94,9 +94,9 @@ def _failure(error: BaseException, stage: str | None, command: Command | None) -
     status: Status | None = None
     exit_code = 1
     message = str(error)
-    if isinstance(error, SystemError) and isinstance(error.__cause__, KeyboardInterrupt):
-        error = error.__cause__  # Ctrl-C in compiled code comes as "returned a result with an exception set"
-        message = str(error)
+    if isinstance(error, SystemError) and "result with an exception set" in message:
+        # Compiled functions raise nothing that is caught here; what came in the midst of one was Ctrl-C.
+        error, message = KeyboardInterrupt(), ""
     if isinstance(error, KeyboardInterrupt):
         where = "" if stage is None else f" in the stage {stage}; what was done before it is kept"
         message, exit_code = message or f"Interrupted{where}.", _INTERRUPTED
