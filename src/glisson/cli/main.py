@@ -93,10 +93,9 @@ def _answer(words: Sequence[str], stdout: TextIO) -> Answer:
 def _failure(error: BaseException, stage: str | None, command: Command | None) -> Answer:
     status: Status | None = None
     exit_code = 1
+    while isinstance(error, SystemError) and error.__cause__ is not None:
+        error = error.__cause__  # Ctrl-C in the midst of a compiled function comes wrapped, once for each caller
     message = str(error)
-    if isinstance(error, SystemError) and "result with an exception set" in message:
-        # Compiled functions raise nothing that is caught here; what came in the midst of one was Ctrl-C.
-        error, message = KeyboardInterrupt(), ""
     if isinstance(error, KeyboardInterrupt):
         where = "" if stage is None else f" in the stage {stage}; what was done before it is kept"
         message, exit_code = message or f"Interrupted{where}.", _INTERRUPTED

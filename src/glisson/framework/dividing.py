@@ -14,11 +14,12 @@ from glisson.core.landmarks import Landmarks
 from glisson.core.protocols import Progress, SegmentDivider, silent
 from glisson.core.registry import make_technique
 from glisson.core.structures import VesselTree
-from glisson.framework.case import LANDMARKS, ORGAN, SEGMENTS, SEGMENTS_PICTURE, STRUCTURES, VESSELS, Case
+from glisson.framework.case import LANDMARKS, ORGAN, SEGMENTS, SEGMENTS_PICTURE, STRUCTURES, VESSEL_TREES, Case
 from glisson.framework.preoperative_stages import labels_of
 from glisson.framework.stages import PIPELINE
 from glisson.io.images import read_labels, write_labels
 from glisson.io.markups import NamedPoints, read_points, write_points
+from glisson.io.vessel_files import read_vessels
 from glisson.navigation.figures.segment_views import write_segment_views
 from glisson.preoperative.segments.landmarks import landmarks_from_points
 from glisson.preoperative.segments.numbering import SEGMENT_NAMES
@@ -28,7 +29,6 @@ from glisson.preoperative.vessels.centrelines import centreline_trees
 
 BY_BRANCHES, BY_PLANES = "nearest-branch", "planes"
 _SMALLEST_TREE_MM = 10.0
-_VESSEL_MAPS = (VESSELS, STRUCTURES)
 
 
 @dataclass(frozen=True)
@@ -97,15 +97,16 @@ def case_resections(case: Case, segments_file: str | Path | None = None) -> tupl
 
 
 def _trees(case: Case, organ: LabelMap, name: str) -> tuple[VesselTree, ...]:
-    """Trees of a vein inside the liver, the longest first; none where the case does not know it."""
-    for file in _VESSEL_MAPS:
-        labels = labels_of(case, file)
-        if labels is not None and name in labels.names.values():
-            found = centreline_trees(labels.mask(name) & organ.mask("liver"), organ.grid, _SMALLEST_TREE_MM)
-            return tuple(
-                VesselTree(f"{name} {n}", tree.points_mm, tree.radii_mm, tree.edges) for n, tree in enumerate(found, 1)
-            )
-    return ()
+    """Trees of a vein: those of `glisson vessels`, else of its mask inside the liver; none where it is not known."""
+    if case.has(VESSEL_TREES):
+        return tuple(tree for tree in read_vessels(case.path(VESSEL_TREES)) if tree.name.partition(" ")[0] == name)
+    labels = labels_of(case, STRUCTURES)
+    if labels is None or name not in labels.names.values():
+        return ()
+    found = centreline_trees(labels.mask(name) & organ.mask("liver"), organ.grid, _SMALLEST_TREE_MM)
+    return tuple(
+        VesselTree(f"{name} {n}", tree.points_mm, tree.radii_mm, tree.edges) for n, tree in enumerate(found, 1)
+    )
 
 
 def _cava(case: Case) -> FloatArray | None:
