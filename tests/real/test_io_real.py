@@ -1,7 +1,6 @@
 """Readers on real files: figures of the data's PROVENANCE.md, and voxels and nodes by other libraries."""
 
 import re
-import tarfile
 
 import meshio
 import nibabel
@@ -19,15 +18,6 @@ from glisson.io.totalsegmentator import class_names
 
 pytestmark = pytest.mark.real
 LPS_FROM_RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
-
-
-@pytest.fixture(scope="module")
-def ircad(shared_data, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("ircad")
-    for name in ("PATIENT_DICOM", "MASKS_DICOM"):
-        with tarfile.open(shared_data / "research-only" / "ircadb01-case17" / f"{name}.tar.xz") as archive:
-            archive.extractall(folder, filter="data")
-    return folder
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,5 @@
 """The liver of a real CT (3D-IRCADb-01, case 17), found and corrected; tumours count as liver."""
 
-import tarfile
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -22,15 +20,10 @@ Mask = NDArray[np.bool_]
 
 
 @pytest.fixture(scope="module")
-def scan(shared_data: Path) -> tuple[Volume, Mask]:
-    """The CT and its liver; nothing of it stays on the disk."""
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        for part in ("PATIENT_DICOM", "MASKS_DICOM"):
-            with tarfile.open(shared_data / "research-only" / "ircadb01-case17" / f"{part}.tar.xz") as archive:
-                archive.extractall(folder, filter="data")
-        liver = read_dicom_mask(folder / "MASKS_DICOM" / "liver")
-        return read_volume(folder / "PATIENT_DICOM"), np.asarray(liver.voxels) > 0
+def scan(ircad: Path) -> tuple[Volume, Mask]:
+    """The CT and its liver."""
+    liver = read_dicom_mask(ircad / "MASKS_DICOM" / "liver")
+    return read_volume(ircad / "PATIENT_DICOM"), np.asarray(liver.voxels) > 0
 
 
 @pytest.fixture(scope="module")

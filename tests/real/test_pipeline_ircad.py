@@ -1,8 +1,6 @@
 """A real CT (3D-IRCADb-01, case 17): the whole way, from its masks and from the CT with one click."""
 
 import json
-import shutil
-import tarfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -29,17 +27,6 @@ PLANE = """
 points_mm = [[172.0, 100.0, 100.0], [172.0, 200.0, 100.0], [172.0, 100.0, 170.0]]
 """
 """A sagittal plane medial of tumour2, which lies in the left lobe; the case has no wire for the rule."""
-
-
-@pytest.fixture(scope="module")
-def ircad(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The unpacked case; nothing of it outlives the tests."""
-    folder = tmp_path_factory.mktemp("ircad")
-    for name in ("PATIENT_DICOM", "MASKS_DICOM"):
-        with tarfile.open(shared_data / "research-only" / "ircadb01-case17" / f"{name}.tar.xz") as archive:
-            archive.extractall(folder, filter="data")
-    yield folder
-    shutil.rmtree(folder)
 
 
 def plan(case: Path) -> None:

@@ -1,6 +1,5 @@
 """Model from the masks of a real CT (3D-IRCADb-01, case 17); labels and one click on TotalSegmentator's CT."""
 
-import tarfile
 from pathlib import Path
 
 import numpy as np
@@ -21,13 +20,10 @@ pytestmark = pytest.mark.real
 
 
 @pytest.fixture(scope="module")
-def masks(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, LabelMap]:
-    folder = tmp_path_factory.mktemp("ircad-masks")
-    with tarfile.open(shared_data / "research-only" / "ircadb01-case17" / "MASKS_DICOM.tar.xz") as archive:
-        archive.extractall(folder, filter="data")
+def masks(ircad: Path) -> dict[str, LabelMap]:
     found = {}
     for name in ("liver", "livertumor1", "livertumor2", "portalvein"):
-        image = read_dicom_mask(folder / "MASKS_DICOM" / name)
+        image = read_dicom_mask(ircad / "MASKS_DICOM" / name)
         found[name] = LabelMap((np.asarray(image.voxels) > 0).astype(np.uint8), image.grid, {1: name})
     return found
 

@@ -1,7 +1,5 @@
 """Segments and resections of a real liver (3D-IRCADb-01, case 17) from its veins' masks and landmarks read off them."""
 
-import tarfile
-
 import numpy as np
 import pytest
 
@@ -29,11 +27,8 @@ LANDMARKS_MM = {
 
 
 @pytest.fixture(scope="module")
-def masks(shared_data, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("ircad-veins")
-    with tarfile.open(shared_data / "research-only" / "ircadb01-case17" / "MASKS_DICOM.tar.xz") as archive:
-        archive.extractall(folder, filter="data")
-    return {name: read_dicom_mask(folder / "MASKS_DICOM" / name) for name in ("liver", "portalvein")}
+def masks(ircad):
+    return {name: read_dicom_mask(ircad / "MASKS_DICOM" / name) for name in ("liver", "portalvein")}
 
 
 @pytest.mark.parametrize(

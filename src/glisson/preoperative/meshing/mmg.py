@@ -5,10 +5,8 @@ as the sizes allow and its elements better. The same surface gives the same mesh
 child process (`mmg_process`), so that a crash is a sentence and Ctrl-C ends it at once.
 """
 
-import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -26,6 +24,7 @@ from glisson.core.parameters import parameter
 from glisson.core.protocols import Progress, silent
 from glisson.core.status import Status
 from glisson.geometry.distance import SurfaceTree
+from glisson.preoperative.child_process import run_child
 from glisson.preoperative.meshing.lattice import body_centred_lattice, inside_of_level
 from glisson.preoperative.meshing.mesh_quality import face_connected_parts
 
@@ -125,33 +124,22 @@ class Mmg:
                 shortest_mm=0.5 * min([self._spacing_mm, *(zone.edge_length_mm for zone in finer)]),
                 envelope_mm=self._parameters.envelope_mm,
             )
-            self._wait(source, target, progress)
+            self._run(source, target, progress)
             with np.load(target) as made:
                 return made["nodes"].astype(np.float64), made["tetrahedra"].astype(np.int64)
 
-    def _wait(self, source: Path, target: Path, progress: Progress) -> None:
-        """Run the child to its end; it is killed when this process is interrupted."""
-        log_path = target.with_name("log.txt")
+    def _run(self, source: Path, target: Path, progress: Progress) -> None:
         command = [sys.executable, "-m", "glisson.preoperative.meshing.mmg_process", str(source), str(target)]
-        start = time.monotonic()
-        with (
-            log_path.open("wb") as log,
-            subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, cwd=target.parent) as child,
-        ):
-            try:
-                while child.poll() is None:
-                    seconds = time.monotonic() - start
-                    if seconds > self._parameters.time_limit_s:
-                        raise StageFailed(
-                            f"Mmg was given up after {seconds:.0f} s; choose a larger envelope_mm.",
-                            Status.ITERATION_LIMIT,
-                        )
-                    progress(None, f"tetrahedra, {seconds:.0f} s")
-                    time.sleep(0.05)
-            finally:
-                child.kill()
-        if child.returncode != 0 or not target.is_file():
-            raise StageFailed(_crash_sentence(child.returncode, log_path), Status.STAGNATED)
+        try:
+            code, said = run_child(command, target.parent, "tetrahedra", progress, self._parameters.time_limit_s)
+        except TimeoutError as error:
+            raise StageFailed(f"Mmg was {error}; choose a larger envelope_mm.", Status.ITERATION_LIMIT) from None
+        if code != 0 or not target.is_file():
+            raise StageFailed(
+                f"Mmg could not mesh the surface ({said[:200] or f'exit code {code}'}); smooth the mask or choose "
+                "another envelope_mm.",
+                Status.STAGNATED,
+            )
 
 
 def _check_surface(surface: TriangleSurface) -> None:
@@ -195,12 +183,6 @@ def _sizes(nodes: FloatArray, longest_mm: float, finer: Sequence[FineZone]) -> F
         distance, _ = cKDTree(zone.points_mm).query(nodes)
         sizes[distance <= zone.reach_mm] = np.minimum(sizes[distance <= zone.reach_mm], zone.edge_length_mm)
     return sizes
-
-
-def _crash_sentence(code: int, log_path: Path) -> str:
-    lines = log_path.read_text(errors="replace").strip().splitlines()
-    reason = lines[-1].strip()[:200] if lines else f"exit code {code}"
-    return f"Mmg could not mesh the surface ({reason}); smooth the mask or choose another envelope_mm."
 
 
 def _largest_part(nodes: FloatArray, tetrahedra: IntArray) -> TetMesh:

@@ -6,9 +6,7 @@ weights when it runs first.
 """
 
 import shutil
-import subprocess
 import tempfile
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
@@ -22,6 +20,7 @@ from glisson.core.image import Grid, LabelMap, Volume
 from glisson.core.parameters import parameter
 from glisson.core.protocols import Progress, Segmentation, silent
 from glisson.core.status import Status
+from glisson.preoperative.child_process import run_child
 from glisson.preoperative.liver.plugins.cleaned import cleaned_liver
 
 _PROGRAM = "TotalSegmentator"
@@ -75,28 +74,13 @@ class TotalSegmentator:
             options = ["--task", _TASKS[volume.modality], "--roi_subset", "liver", "--device", self._parameters.device]
             if self._parameters.fast:
                 options.append("--fast")
-            _run([program, "-i", str(folder / "scan.nii.gz"), "-o", str(folder / "found"), *options], folder, progress)
+            command = [program, "-i", str(folder / "scan.nii.gz"), "-o", str(folder / "found"), *options]
+            code, said = run_child(command, folder, _PROGRAM, progress)
+            if code != 0:
+                reason = said[:200] or "it said nothing"
+                raise StageFailed(f"{_PROGRAM} ended with the code {code}: {reason}.", Status.STAGNATED)
             found = _read(folder / "found" / "liver.nii.gz", volume.grid)
         return cleaned_liver(volume, found, labels, _PROGRAM)
-
-
-def _run(command: list[str], folder: Path, progress: Progress) -> None:
-    """Run the program to its end; it is killed when this process is interrupted."""
-    start, log_path = time.monotonic(), folder / "log.txt"
-    with (
-        log_path.open("wb") as log,
-        subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, cwd=folder) as child,
-    ):
-        try:
-            while child.poll() is None:
-                progress(None, f"{_PROGRAM}, {time.monotonic() - start:.0f} s")
-                time.sleep(0.1)
-        finally:
-            child.kill()
-    if child.returncode != 0:
-        lines = log_path.read_text(encoding="utf-8", errors="replace").split("\n")
-        last = next((line.strip() for line in reversed(lines) if line.strip()), "it said nothing")
-        raise StageFailed(f"{_PROGRAM} ended with the code {child.returncode}: {last[:200]}.", Status.STAGNATED)
 
 
 def _write(path: Path, volume: Volume) -> None:
