@@ -1,4 +1,4 @@
-"""What grey values the organ has, from the surroundings of a click."""
+"""What grey values the organ has: from the surroundings of a click first, then from the organ itself."""
 
 from dataclasses import dataclass
 
@@ -15,23 +15,31 @@ _REACH_MM = 12.0
 """Standard deviation of the Gaussian weight about the click."""
 
 _BINS = 280
+_MODE_WINDOW, _SPREAD_WINDOW = 25.0, 40.0
+
+
+_LOCAL_BAND, _ORGAN_BAND = 5.0, 3.0
+"""Half of the band in deviations: tissue spreads little about a click, and more over a whole organ."""
+
+_NARROWEST, _WIDEST = 16.0, 28.0
+"""Half of the narrowest and the widest band (HU); a wider one would hold neighbouring organs."""
+
+_INSIDE_MM = 5.0
+"""What lies so deep in a region is not its border's partial volumes."""
 
 
 @dataclass(frozen=True)
 class IntensityPrior:
-    """The organ's most frequent grey value and the robust spread about it (HU)."""
+    """The organ's most frequent grey value and the robust spread about it (HU); `band` in deviations to each side."""
 
     mean: float
     deviation: float
+    band: float = _LOCAL_BAND
 
     @property
     def half_width(self) -> float:
-        """Half of the band of grey values that the organ's tissue has (HU).
-
-        Smoothed tissue spreads little about a click and more over a whole organ, so the band is not
-        narrower than 16 HU; above 28 HU it would hold neighbouring organs.
-        """
-        return float(np.clip(5.0 * self.deviation, 16.0, 28.0))
+        """Half of the band of grey values that the organ's tissue has (HU)."""
+        return float(np.clip(self.band * self.deviation, _NARROWEST, _WIDEST))
 
 
 def estimate_prior(
@@ -57,15 +65,37 @@ def estimate_prior(
     histogram, edges = np.histogram(value, bins=_BINS, range=SOFT_TISSUE_HU, weights=weight)
     bin_width = float(edges[1] - edges[0])
     mode = float(edges[np.argmax(ndimage.gaussian_filter1d(histogram, 6.0 / bin_width))]) + 0.5 * bin_width
-    for _ in range(20):  # mean shift with a window of 25 HU settles within a few
-        near = np.abs(value - mode) < 25.0
-        mode = float(np.average(value[near], weights=weight[near]))
-    near = np.abs(value - mode) < 40.0
-    distances = np.abs(value[near] - mode)
+    return IntensityPrior(*_mode_and_spread(value, weight, mode))
+
+
+def organ_prior(
+    smooth: NDArray[np.float32], region: NDArray[np.bool_], spacing_mm: FloatArray, prior: IntensityPrior
+) -> IntensityPrior:
+    """Mode and spread of the soft tissue deep in a region.
+
+    Args:
+        smooth: smoothed grey values (a, b, c).
+        region: what is the organ for all that is known, same shape.
+        spacing_mm: voxel spacing (3,).
+        prior: that the region was found with; it is kept where nothing lies deep enough.
+    """
+    deep = ndimage.distance_transform_edt(region, sampling=spacing_mm) > _INSIDE_MM
+    values = smooth[deep].astype(np.float64)
+    if not (np.abs(values - prior.mean) < _MODE_WINDOW).any():
+        return prior
+    return IntensityPrior(*_mode_and_spread(values, np.ones(len(values)), prior.mean), _ORGAN_BAND)
+
+
+def _mode_and_spread(values: FloatArray, weights: FloatArray, mode: float) -> tuple[float, float]:
+    """The mode of weighted values (n,) near a first guess, and the deviation by their median distance from it."""
+    for _ in range(20):  # mean shift settles within a few
+        near = np.abs(values - mode) < _MODE_WINDOW
+        mode = float(np.average(values[near], weights=weights[near]))
+    near = np.abs(values - mode) < _SPREAD_WINDOW
+    distances = np.abs(values[near] - mode)
     order = np.argsort(distances)
-    total = np.cumsum(weight[near][order])
-    median = float(distances[order][int(np.searchsorted(total, 0.5 * total[-1]))])
-    return IntensityPrior(mode, 1.4826 * median)
+    total = np.cumsum(weights[near][order])
+    return mode, 1.4826 * float(distances[order][int(np.searchsorted(total, 0.5 * total[-1]))])
 
 
 def _around(

@@ -32,6 +32,7 @@ from glisson.preoperative.liver.completion import surface_tumours, without_gaps
 from glisson.preoperative.liver.intensity_prior import IntensityPrior, estimate_prior
 from glisson.preoperative.liver.propagation import propagate
 from glisson.preoperative.liver.reachable import opened, reachable_region
+from glisson.preoperative.liver.settled_prior import settled_prior
 from glisson.preoperative.liver.slice_flags import flag_slices
 
 _CONTOUR_RANGE = 3.0
@@ -100,6 +101,8 @@ class SeededContour:
         prior = estimate_prior(smooth, grid.spacing_mm, clicked)
         if prior is None:
             raise BadInput("There is no soft tissue about the click; click inside the liver.")
+        progress(0.05, "the organ's grey values")
+        prior = settled_prior(smooth, prior, grid.spacing_mm, clicked)
         progress(0.1, "region about the click")
         region = _region_with_tumours(smooth, prior, grid.spacing_mm, clicked, grid.working(known) >= 0.5)
         region = without_gaps(region, smooth, grid.spacing_mm, _GAP_MM)
