@@ -9,6 +9,10 @@ from glisson.core.errors import BadInput
 from glisson.phantom.appearance import draw_ct, draw_mr
 from glisson.phantom.family import make_phantom
 from glisson.preoperative.correction.clicked_mask import Click, ClickedMask
+from glisson.preoperative.imaging.ct import smoothed_ct
+from glisson.preoperative.imaging.working_grid import WorkingGrid
+from glisson.preoperative.liver.fine_border import fine_border
+from glisson.preoperative.liver.intensity_prior import IntensityPrior
 from glisson.preoperative.liver.seeded_contour import SeededContour, SeededContourParameters
 from preoperative_shapes import dice, ellipsoid, mask_of
 
@@ -24,6 +28,40 @@ def test_a_liver_is_found_without_a_click(member: int) -> None:
     assert dice(found.labels.mask("liver"), phantom.organ.mask("liver")) >= 0.96
     (sentence,) = [reason for _, reason in found.flagged_slices if "without a click" in reason]
     assert "almost as wide" not in sentence
+
+
+def test_it_matters_little_where_the_click_is() -> None:
+    """Clicks into a tumour, a vessel and the border settle where the widest even tissue does."""
+    phantom = make_phantom(201, SPACING, appearance=draw_ct(201))
+    truth, grid = phantom.organ.mask("liver"), phantom.volume.grid
+    depth = ndimage.distance_transform_edt(truth, sampling=SPACING)
+    vessels, (tumour, *_) = np.asarray(phantom.volume.voxels) > 160, phantom.tumours.names.values()
+    places = {
+        "tumour": phantom.tumours.mask(tumour),
+        "vessel": vessels & (depth > 15.0),
+        "border": truth & (depth < 4.0),
+    }
+    alone = SeededContour(SeededContourParameters()).segment(phantom.volume, None, NO_CLICK).labels.mask("liver")
+    for where, mask in places.items():
+        cells = np.argwhere(mask)
+        click = grid.points_from_indices(cells[[len(cells) // 2]])
+        found = SeededContour(SeededContourParameters()).segment(phantom.volume, None, click).labels.mask("liver")
+        assert dice(found, truth) >= dice(alone, truth) - 0.003, where
+
+
+def test_the_border_is_found_again_in_finer_voxels() -> None:
+    """A ball in fat, by steps of 2 mm, comes nearer to itself in voxels of 1 mm."""
+    grid = Grid((80, 80, 80), [1.0, 1.0, 1.0], [-39.5, -39.5, -39.5])
+    ball = mask_of(ellipsoid((0.3, 0.2, -0.4), (27.0, 24.0, 29.0)), grid)
+    noise = np.random.default_rng(5).normal(0.0, 15.0, grid.shape)
+    volume = Volume((np.where(ball, 100.0, -90.0) + noise).astype(np.int16), grid)
+    working = WorkingGrid.of(grid, 2.0)
+    coarse = working.working(ball) >= 0.5
+    thin = ndimage.binary_erosion(coarse, ndimage.generate_binary_structure(3, 1))
+    for start in (coarse, thin):
+        found = fine_border(volume, start, smoothed_ct(volume, working), IntensityPrior(100.0, 4.0), working)
+        print(dice(found, ball), dice(working.full(start), ball))
+        assert dice(found, ball) > max(0.985, dice(working.full(start), ball))
 
 
 def two_balls(gap_hu: int) -> tuple[Volume, np.ndarray, np.ndarray]:

@@ -9,13 +9,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from scipy import ndimage
 
 from glisson.core.errors import BadInput
 from glisson.framework.case import SCENARIO, TRUTH, Case, new_case, open_case
 from glisson.framework.hashing import source_hash
 from glisson.framework.importing import write_images
 from glisson.framework.settings import Point, SegmentSettings, Settings, TechniqueChoice
+from glisson.geometry.distance_map import distance_inside
 from glisson.io.deformation_files import write_deformation
 from glisson.io.images import write_labels
 from glisson.io.scenario_files import write_scenario
@@ -57,7 +57,7 @@ def demo_case(folder: str | Path) -> Case:
 def click_inside(phantom: Phantom) -> Point:
     """The point of the liver (LPS mm) that is furthest from its surface, its vessels and tumours."""
     tissue = (phantom.organ.voxels > 0) & (phantom.tumours.voxels == 0) & (phantom.structures.voxels == 0)
-    depth = ndimage.distance_transform_edt(tissue, sampling=phantom.organ.grid.spacing_mm)
+    depth = distance_inside(tissue, phantom.organ.grid.spacing_mm)
     index = np.array(np.unravel_index(int(depth.argmax()), depth.shape), dtype=np.float64)
     x, y, z = phantom.organ.grid.points_from_indices(index[None])[0]
     return round(float(x), 1), round(float(y), 1), round(float(z), 1)

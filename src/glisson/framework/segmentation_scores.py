@@ -15,6 +15,7 @@ from skimage.morphology import skeletonize
 from glisson.core.arrays import FloatArray
 from glisson.core.errors import BadInput
 from glisson.core.image import Grid
+from glisson.geometry.distance_map import distance_inside
 
 
 @dataclass(frozen=True)
@@ -67,5 +68,5 @@ def centreline_dice(found: NDArray[np.bool_], reference: NDArray[np.bool_]) -> f
 
 def _surface_distances_mm(a: NDArray[np.bool_], b: NDArray[np.bool_], spacing_mm: FloatArray) -> FloatArray:
     surface_a, surface_b = (mask & ~ndimage.binary_erosion(mask) for mask in (a, b))
-    to_b, to_a = (ndimage.distance_transform_edt(~surface, sampling=spacing_mm) for surface in (surface_b, surface_a))
+    to_b, to_a = (distance_inside(~surface, spacing_mm) for surface in (surface_b, surface_a))
     return np.concatenate([to_b[surface_a], to_a[surface_b]])

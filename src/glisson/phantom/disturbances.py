@@ -9,11 +9,12 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt, gaussian_filter, shift
+from scipy.ndimage import gaussian_filter, shift
 from skimage.transform import iradon, radon
 
 from glisson.core.arrays import FloatArray
 from glisson.core.image import Grid
+from glisson.geometry.distance_map import distance_inside
 
 _ANGLES = 180
 _NEAR_MM = 30.0
@@ -38,7 +39,7 @@ def streaks(
         made = np.zeros(grid.shape, dtype=np.float32)
         for k in np.flatnonzero(source.any(axis=(0, 1))):
             made[:, :, k] = _reconstructed(rays(source[:, :, k].astype(float), grid, random), grid.shape[:2])
-        near = (distance_transform_edt(~source, sampling=grid.spacing_mm) < _NEAR_MM) & ~source
+        near = (distance_inside(~source, grid.spacing_mm) < _NEAR_MM) & ~source
         found += made * np.float32(sigma / max(float(made[near].std()), 1e-6))
     return found
 

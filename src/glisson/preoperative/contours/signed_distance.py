@@ -7,9 +7,9 @@ Cells beside the zero level keep their sub-voxel distance (Russo and Smereka 200
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from glisson.core.arrays import FloatArray
+from glisson.geometry.distance_map import distance_inside
 
 
 def signed_distance_of_mask(mask: NDArray[np.bool_], spacing_mm: FloatArray) -> FloatArray:
@@ -17,8 +17,8 @@ def signed_distance_of_mask(mask: NDArray[np.bool_], spacing_mm: FloatArray) -> 
 
     The border is taken halfway between the voxels inside and outside.
     """
-    outside = ndimage.distance_transform_edt(~mask, sampling=spacing_mm)
-    inside = ndimage.distance_transform_edt(mask, sampling=spacing_mm)
+    outside = distance_inside(~mask, spacing_mm)
+    inside = distance_inside(mask, spacing_mm)
     half = 0.5 * float(np.mean(spacing_mm))
     result: FloatArray = np.where(mask, half - inside, outside - half)
     return result

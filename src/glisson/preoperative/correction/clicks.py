@@ -14,6 +14,7 @@ from scipy import ndimage
 from skimage.segmentation import watershed
 
 from glisson.core.arrays import FloatArray
+from glisson.geometry.distance_map import distance_inside
 from glisson.preoperative.imaging.surroundings import Index, distance_from, surroundings
 from glisson.preoperative.liver.completion import without_gaps
 from glisson.preoperative.liver.piece import like_piece
@@ -46,7 +47,7 @@ def with_piece(
     inside, values = mask[box], smooth[box]
     piece = like_piece(values, ~inside, spacing_mm, place, _REACH_MM)
     piece |= ~inside & (distance_from(place, inside.shape, spacing_mm) <= _TOUCH_MM)
-    near = ndimage.distance_transform_edt(~piece, sampling=spacing_mm) <= 2.0 * _RIM_MM
+    near = distance_inside(~piece, spacing_mm) <= 2.0 * _RIM_MM
     rim = without_gaps(inside | piece, values, spacing_mm, _RIM_MM) & near
     result = mask.copy()
     result[box] |= piece | rim
@@ -64,7 +65,7 @@ def without_piece(
         click: the voxel clicked, inside the mask.
         kept: voxels that belong to the organ in any case: where others have clicked.
     """
-    width = ndimage.distance_transform_edt(mask, sampling=spacing_mm)
+    width = distance_inside(mask, spacing_mm)
     core = width >= _CORE_SHARE * width.max()
     for index in kept:
         core[index] = True

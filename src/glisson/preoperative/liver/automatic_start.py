@@ -15,6 +15,7 @@ from glisson.core.arrays import FloatArray
 from glisson.core.errors import StageFailed
 from glisson.core.image import Grid
 from glisson.core.status import Status
+from glisson.geometry.distance_map import distance_inside
 from glisson.preoperative.imaging.working_grid import WorkingGrid
 
 _COARSE_MM = 3.0
@@ -32,7 +33,7 @@ _SHARE = 0.65
 _AIR_HU = -250.0
 _LUNG_HU = -500.0
 _SMALLEST_LUNG_ML = 20.0
-_NARROWEST_MM = 22.0
+_NARROWEST_MM = 18.0
 """Radius of the ball that a liver holds at least."""
 
 _BELOW_LUNG_MM, _ABOVE_LUNG_MM = 200.0, 150.0
@@ -135,7 +136,7 @@ def _widest(
     for level in _LEVELS_HU:
         band = (np.abs(coarse - level) < _BAND_HU).astype(np.float32)
         even = ndimage.uniform_filter(band, 3) > _SHARE
-        depth = ndimage.distance_transform_edt(even, sampling=spacing_mm) * allowed
+        depth = distance_inside(even, spacing_mm) * allowed
         best = int(np.argmax(depth))
         if depth.flat[best] > widest:
             a, b, c = np.unravel_index(best, depth.shape)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from glisson.core.arrays import FloatArray
+from glisson.geometry.distance_map import distance_inside
 from glisson.preoperative.liver.intensity_prior import IntensityPrior
 from glisson.preoperative.liver.piece import like_piece
 
@@ -72,7 +73,7 @@ def _bodies(
     """Each tumour as far as it lies in its bay, and its deepest voxel."""
     dark = (smooth > _DARKEST_HU) & (smooth < prior.mean - 0.5 * prior.half_width) & ~organ
     dark &= _closed(organ, spacing_mm, _BAY_MM)
-    depth = ndimage.distance_transform_edt(dark, sampling=spacing_mm)
+    depth = distance_inside(dark, spacing_mm)
     cores, count = ndimage.label(depth > _THINNEST_MM)
     if count == 0:
         return
@@ -82,7 +83,7 @@ def _bodies(
         body = bodies == number
         if body.sum() * float(np.prod(spacing_mm)) * 1e-3 < _SMALLEST_ML or np.median(smooth[body]) < _WATER_HU:
             continue
-        rind = (ndimage.distance_transform_edt(~body, sampling=spacing_mm) <= _RIND_MM) & ~body
+        rind = (distance_inside(~body, spacing_mm) <= _RIND_MM) & ~body
         if (rind & organ).sum() > _ENCLOSED_SHARE * rind.sum():
             a, b, c = np.unravel_index(int(np.argmax(np.where(body, depth, 0.0))), body.shape)
             yield body, (int(a), int(b), int(c))
@@ -90,8 +91,8 @@ def _bodies(
 
 def _closed(organ: NDArray[np.bool_], spacing_mm: FloatArray, radius_mm: float) -> NDArray[np.bool_]:
     """The mask and what a ball of this radius outside it can't reach; the scan's end is no border."""
-    outside = ndimage.distance_transform_edt(~organ, sampling=spacing_mm) > radius_mm
-    closed: NDArray[np.bool_] = ndimage.distance_transform_edt(~outside, sampling=spacing_mm) > radius_mm
+    outside = distance_inside(~organ, spacing_mm) > radius_mm
+    closed: NDArray[np.bool_] = distance_inside(~outside, spacing_mm) > radius_mm
     return closed
 
 

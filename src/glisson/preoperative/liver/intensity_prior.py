@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from glisson.core.arrays import FloatArray
+from glisson.geometry.distance_map import distance_inside
 
 SOFT_TISSUE_HU = (-30.0, 250.0)
 """Range of everything that can be a liver, contrasted or fatty, with its vessels and tumours."""
@@ -79,7 +80,7 @@ def organ_prior(
         spacing_mm: voxel spacing (3,).
         prior: that the region was found with; it is kept where nothing lies deep enough.
     """
-    deep = ndimage.distance_transform_edt(region, sampling=spacing_mm) > _INSIDE_MM
+    deep = distance_inside(region, spacing_mm) > _INSIDE_MM
     values = smooth[deep].astype(np.float64)
     if not (np.abs(values - prior.mean) < _MODE_WINDOW).any():
         return prior

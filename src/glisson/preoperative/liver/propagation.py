@@ -13,6 +13,7 @@ from scipy import ndimage
 
 from glisson.core.arrays import FloatArray
 from glisson.core.protocols import Progress
+from glisson.geometry.distance_map import distance_inside
 from glisson.preoperative.contours.localized_contour import ContourResult, LocalizedContourParameters, evolve
 from glisson.preoperative.contours.signed_distance import signed_distance_of_mask
 
@@ -93,7 +94,7 @@ def _contour(
     start = region
     if before is not None:
         growth = max(_LEAST_GROWTH_MM, _GROWTH_PER_MM * float(spacing_mm[2]))
-        near = ndimage.distance_transform_edt(~before, sampling=in_plane) <= growth
+        near = distance_inside(~before, in_plane) <= growth
         start = _parts_touching(region & near, near & before)
     if start.sum() * pixel < _SMALLEST_AREA_MM2:
         return None

@@ -12,6 +12,7 @@ from scipy import ndimage
 from skimage.segmentation import watershed
 
 from glisson.core.arrays import FloatArray, IntArray
+from glisson.geometry.distance_map import distance_inside
 from glisson.preoperative.liver.intensity_prior import SOFT_TISSUE_HU, IntensityPrior
 
 _NARROWEST_PASSAGE = 0.3
@@ -48,7 +49,7 @@ def reachable_region(
     """
     band = np.abs(smooth - prior.mean) < prior.half_width
     filled = _without_vessel_gaps(band, spacing_mm) & (smooth > SOFT_TISSUE_HU[0])
-    distance = ndimage.distance_transform_edt(filled, sampling=spacing_mm)
+    distance = distance_inside(filled, spacing_mm)
     width = ndimage.gaussian_filter(distance.astype(np.float32), 1.5 / spacing_mm) * filled
     # Flat tops and ripples give more basins than needed; their wide passages join them again below.
     size = np.maximum(np.rint(_LEAST_APART_MM / spacing_mm), 3).astype(int)
@@ -65,11 +66,11 @@ def reachable_region(
 
 def opened(region: NDArray[np.bool_], spacing_mm: FloatArray, radius_mm: float) -> NDArray[np.bool_]:
     """The largest part of a region that a ball of this radius reaches, and a millimetre about it."""
-    cores, count = ndimage.label(ndimage.distance_transform_edt(region, sampling=spacing_mm) > radius_mm)
+    cores, count = ndimage.label(distance_inside(region, spacing_mm) > radius_mm)
     if count == 0:
         return np.zeros(region.shape, dtype=bool)
     core = cores == int(np.argmax(np.bincount(cores.ravel())[1:])) + 1
-    result: NDArray[np.bool_] = region & (ndimage.distance_transform_edt(~core, sampling=spacing_mm) < radius_mm + 1.0)
+    result: NDArray[np.bool_] = region & (distance_inside(~core, spacing_mm) < radius_mm + 1.0)
     return result
 
 
@@ -90,9 +91,7 @@ def _without_vessel_gaps(band: NDArray[np.bool_], spacing_mm: FloatArray) -> NDA
 def _joined_basins(basins: IntArray, count: int, width: FloatArray, values: NDArray[np.float32]) -> IntArray:
     """For each basin 0 … count the number of the group that it is joined to, (count + 1,)."""
     numbers = np.arange(count + 1)
-    widest = np.asarray(ndimage.maximum(width, basins, numbers), dtype=np.float64)
-    level = np.asarray(ndimage.median(values, basins, numbers), dtype=np.float64)
-    size = np.bincount(basins.ravel(), minlength=count + 1).astype(np.float64)
+    widest, level, size = _basin_properties(basins, count, width, values)
     group = numbers.copy()
     for passage, first, second in _passages(basins, count, width):
         a, b = _root(group, first), _root(group, second)
@@ -105,6 +104,20 @@ def _joined_basins(basins: IntArray, count: int, width: FloatArray, values: NDAr
             level[a] = (level[a] * size[a] + level[b] * size[b]) / (size[a] + size[b])
             size[a] += size[b]
     return np.array([_root(group, n) for n in range(count + 1)], dtype=np.int64)
+
+
+def _basin_properties(
+    basins: IntArray, count: int, width: FloatArray, values: NDArray[np.float32]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Largest width, median grey value and number of voxels of each basin 0 … count (the first means nothing)."""
+    cells = np.flatnonzero(basins)
+    own, grey = basins.ravel()[cells], values.ravel()[cells]
+    order = np.lexsort((grey, own))
+    ends = np.searchsorted(own[order], np.arange(1, count + 2))
+    starts, size = ends[:-1], np.diff(ends)
+    widest = np.maximum.reduceat(width.ravel()[cells][order], starts)
+    level = 0.5 * (grey[order][starts + (size - 1) // 2] + grey[order][starts + size // 2])
+    return np.append(0.0, widest), np.append(0.0, level), np.append(0.0, size)
 
 
 def _root(group: IntArray, basin: int) -> int:

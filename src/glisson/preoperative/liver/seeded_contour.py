@@ -1,9 +1,10 @@
 """The liver from a CT and a click or none, or an MR and a click: localized contours from slice to slice.
 
-Without a click the start is found (`automatic_start`). The click gives the liver's grey values; what of their
+The start is found (`automatic_start`), and a click confirms it; one elsewhere is the start itself. What of the start's
 band belongs together with it, by the width of passages and the grey value, is the region that the contours
-start from (`reachable`), completed by surface tumours (`completion`). The contours run from the largest slice
-to both ends (`propagation`).
+start from (`reachable`), completed by surface tumours (`completion`); the grey values settle with it
+(`settled_prior`). The contours run from the largest slice to both ends (`propagation`), and where the scan's voxels are
+finer the border is found again in them (`fine_border`).
 """
 
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ from glisson.core.parameters import parameter
 from glisson.core.protocols import Progress, Segmentation, silent
 from glisson.core.status import Status
 from glisson.core.units import place_text
+from glisson.geometry.distance_map import distance_inside
 from glisson.preoperative.contours.localized_contour import LocalizedContourParameters
 from glisson.preoperative.imaging.axial import slice_axis
 from glisson.preoperative.imaging.borders import touched_borders
@@ -29,6 +31,7 @@ from glisson.preoperative.imaging.mr import smoothed_mr
 from glisson.preoperative.imaging.working_grid import WorkingGrid
 from glisson.preoperative.liver.automatic_start import Start, find_start
 from glisson.preoperative.liver.completion import surface_tumours, without_gaps
+from glisson.preoperative.liver.fine_border import fine_border
 from glisson.preoperative.liver.intensity_prior import IntensityPrior, estimate_prior
 from glisson.preoperative.liver.propagation import propagate
 from glisson.preoperative.liver.reachable import opened, reachable_region
@@ -39,6 +42,9 @@ _CONTOUR_RANGE = 3.0
 """The contour sees grey values up to so many half widths of the liver's band: lung would blind it to fat."""
 
 _GAP_MM = 4.0
+_NEAR_MM = 5.0
+"""A click so near to the region that is found without one says that it is the right one."""
+
 _TUMOUR_ROUNDS = 2
 _SMALLEST_ML = 100.0
 _USUAL_ML = (500.0, 4000.0)
@@ -95,22 +101,24 @@ class SeededContour:
         known = _known_tumours(volume, labels)
         grid = WorkingGrid.of(volume.grid, self._parameters.resolution_mm)
         progress(0.0, "smoothing")
-        smooth, start, seeds_mm = _started(volume, grid, np.asarray(seeds_mm, dtype=np.float64).reshape(-1, 3))
-        clicked = [grid.working_index(index) for index in volume.grid.indices_from_points(seeds_mm)]
+        seeds_mm = np.asarray(seeds_mm, dtype=np.float64).reshape(-1, 3)
+        smooth, clicked = _smoothed(volume, grid, seeds_mm)
         _require_soft_tissue(smooth, clicked, seeds_mm)
-        prior = estimate_prior(smooth, grid.spacing_mm, clicked)
-        if prior is None:
+        progress(0.05, "region")
+        tumours = grid.working(known) >= 0.5
+        start = _start(smooth, volume, grid, needed=not clicked)
+        found = None if start is None else _region_about(smooth, grid, [_place(start, volume.grid, grid)], tumours)
+        if clicked and (found is None or not _holds(found[0], clicked, grid)):
+            found = _region_about(smooth, grid, clicked, tumours)
+        if found is None:
             raise BadInput("There is no soft tissue about the click; click inside the liver.")
-        progress(0.05, "the organ's grey values")
-        prior = settled_prior(smooth, prior, grid.spacing_mm, clicked)
-        progress(0.1, "region about the click")
-        region = _region_with_tumours(smooth, prior, grid.spacing_mm, clicked, grid.working(known) >= 0.5)
-        region = without_gaps(region, smooth, grid.spacing_mm, _GAP_MM)
-        _require_volume(region, grid, seeds_mm)
+        region, prior = found
+        _require_volume(region, grid, seeds_mm if start is None or clicked else start.point_mm[None])
         organ, flags = self._contoured(smooth, region, prior, grid, progress)
-        full = ndimage.binary_fill_holes(grid.full(organ) | known)
+        on_scan = fine_border(volume, organ, smooth, prior, grid) if volume.modality == "CT" else grid.full(organ)
+        full = ndimage.binary_fill_holes(on_scan | known)
         flags += [(border.slice_near(volume.grid), border.sentence) for border in touched_borders(full)]
-        flags += _volume_flag(full, volume.grid) + _start_flags(start, full, volume.grid)
+        flags += _volume_flag(full, volume.grid) + _start_flags(None if clicked else start, full, volume.grid)
         return Segmentation(LabelMap(full.astype(np.uint8), volume.grid, {1: "liver"}), tuple(sorted(flags)))
 
     def _contoured(
@@ -151,6 +159,29 @@ def _known_tumours(volume: Volume, labels: LabelMap | None) -> NDArray[np.bool_]
     return labels.mask(*names)
 
 
+def _region_about(
+    smooth: NDArray[np.float32],
+    grid: WorkingGrid,
+    clicked: list[tuple[int, int, int]],
+    tumours: NDArray[np.bool_],
+) -> tuple[NDArray[np.bool_], IntensityPrior] | None:
+    """The organ's region about clicks, and its grey values; None where there is no soft tissue."""
+    local = estimate_prior(smooth, grid.spacing_mm, clicked)
+    if local is None:
+        return None
+    prior = settled_prior(smooth, local, grid.spacing_mm, clicked)
+    region = _region_with_tumours(smooth, prior, grid.spacing_mm, clicked, tumours)
+    return without_gaps(region, smooth, grid.spacing_mm, _GAP_MM), prior
+
+
+def _holds(region: NDArray[np.bool_], clicked: list[tuple[int, int, int]], grid: WorkingGrid) -> bool:
+    """Whether the region holds the clicks; a tumour or a border that it lacks may lie a little outside."""
+    if not region.any():
+        return False
+    away = distance_inside(~region, grid.spacing_mm)
+    return all(away[index] <= _NEAR_MM for index in clicked)
+
+
 def _region_with_tumours(
     smooth: NDArray[np.float32],
     prior: IntensityPrior,
@@ -182,23 +213,35 @@ def _reachable_with(
     return reached | tumours if reached.any() else reached
 
 
-def _started(
+def _smoothed(
     volume: Volume, grid: WorkingGrid, seeds_mm: FloatArray
-) -> tuple[NDArray[np.float32], Start | None, FloatArray]:
-    """Smoothed values (HU, or on their scale), the start where it was found without a click, and the clicks (n, 3)."""
-    indices = checked_clicks(volume.grid, seeds_mm)
+) -> tuple[NDArray[np.float32], list[tuple[int, int, int]]]:
+    """Smoothed values (HU, or on their scale), and the working voxels that were clicked."""
+    clicked = [grid.working_index(index) for index in checked_clicks(volume.grid, seeds_mm)]
+    if volume.modality == "CT":
+        return smoothed_ct(volume, grid), clicked
+    if not clicked:
+        raise BadInput(
+            "In an MR the liver is not found without a click, since its signal has no scale; give --seed-point "
+            "X,Y,Z (LPS mm)."
+        )
+    return smoothed_mr(volume, grid, clicked), clicked
+
+
+def _start(smooth: NDArray[np.float32], volume: Volume, grid: WorkingGrid, needed: bool) -> Start | None:
+    """Where the liver seems to be, whatever was clicked; None in an MR, and where a click has to tell."""
     if volume.modality != "CT":
-        if len(indices) == 0:
-            raise BadInput(
-                "In an MR the liver is not found without a click, since its signal has no scale; give --seed-point "
-                "X,Y,Z (LPS mm)."
-            )
-        return smoothed_mr(volume, grid, [grid.working_index(index) for index in indices]), None, seeds_mm
-    smooth = smoothed_ct(volume, grid)
-    if len(indices):
-        return smooth, None, seeds_mm
-    start = find_start(smooth, grid, volume.grid)
-    return smooth, start, start.point_mm[None]
+        return None
+    try:
+        return find_start(smooth, grid, volume.grid)
+    except StageFailed:
+        if needed:
+            raise
+        return None
+
+
+def _place(start: Start, scan: Grid, grid: WorkingGrid) -> tuple[int, int, int]:
+    return grid.working_index(scan.indices_from_points(start.point_mm[None])[0])
 
 
 def _require_soft_tissue(
@@ -214,13 +257,17 @@ def _require_soft_tissue(
 
 
 def _require_volume(region: NDArray[np.bool_], grid: WorkingGrid, seeds_mm: FloatArray) -> None:
-    volume_ml = float(region.sum() * np.prod(grid.spacing_mm)) * 1e-3
+    volume_ml = _volume_ml(region, grid)
     if volume_ml < _SMALLEST_ML:
         raise StageFailed(
             f"Only {volume_ml:.1f} ml of like tissue hang together about the click {place_text(seeds_mm[0])}; "
             "click in a larger, even part of the liver.",
             Status.STAGNATED,
         )
+
+
+def _volume_ml(region: NDArray[np.bool_], grid: WorkingGrid) -> float:
+    return float(region.sum() * np.prod(grid.spacing_mm)) * 1e-3
 
 
 def _volume_flag(mask: NDArray[np.bool_], grid: Grid) -> list[tuple[int, str]]:

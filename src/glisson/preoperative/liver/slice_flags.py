@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from glisson.core.arrays import FloatArray, IntArray
+from glisson.geometry.distance_map import distance_inside
 from glisson.preoperative.imaging.working_grid import WorkingGrid
 from glisson.preoperative.liver.intensity_prior import IntensityPrior
 from glisson.preoperative.liver.propagation import SliceContour
@@ -166,10 +167,10 @@ def _heights(mask: NDArray[np.bool_]) -> IntArray:
 
 def _reached(part: NDArray[np.bool_], spacing_mm: FloatArray, radius_mm: float) -> NDArray[np.bool_]:
     """What of a part of a slice is reached by a disc of this radius inside it."""
-    cores = ndimage.distance_transform_edt(part, sampling=spacing_mm[:2]) > radius_mm
+    cores = distance_inside(part, spacing_mm[:2]) > radius_mm
     if not cores.any():
         return np.zeros(part.shape, dtype=bool)
-    reached: NDArray[np.bool_] = part & (ndimage.distance_transform_edt(~cores, sampling=spacing_mm[:2]) <= radius_mm)
+    reached: NDArray[np.bool_] = part & (distance_inside(~cores, spacing_mm[:2]) <= radius_mm)
     return reached
 
 
@@ -189,7 +190,7 @@ def _foreign(
     for number, place in enumerate(ndimage.find_objects(parts), start=1):
         box = tuple(slice(max(side.start - m, 0), side.stop + m) for side, m in zip(place, margin, strict=True))
         part = parts[box] == number
-        rind = (ndimage.distance_transform_edt(~part, sampling=spacing_mm) <= _RIND_MM) & ~part
+        rind = (distance_inside(~part, spacing_mm) <= _RIND_MM) & ~part
         if (rind & mask[box]).sum() >= _ENCLOSED_SHARE * rind.sum():
             other[box] &= ~part
     return other
@@ -199,6 +200,6 @@ def _faint_border(
     mask: NDArray[np.bool_], smooth: NDArray[np.float32], prior: IntensityPrior, spacing_mm: FloatArray
 ) -> float:
     """Fraction of what lies a few millimetres outside a slice's mask that has the organ's grey values."""
-    distance = ndimage.distance_transform_edt(~mask, sampling=spacing_mm[:2])
+    distance = distance_inside(~mask, spacing_mm[:2])
     near = (distance > _SURROUNDINGS_MM[0]) & (distance <= max(_SURROUNDINGS_MM[1], 1.5 * float(spacing_mm[0])))
     return float((np.abs(smooth[near] - prior.mean) < prior.half_width).mean()) if near.any() else 0.0

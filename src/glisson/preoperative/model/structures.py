@@ -9,6 +9,7 @@ from glisson.core.arrays import FloatArray
 from glisson.core.errors import BadInput
 from glisson.core.image import Grid, LabelMap
 from glisson.core.structures import Curve, Structures, Tumour, VesselTree
+from glisson.geometry.distance_map import distance_inside
 from glisson.preoperative.meshing.surface import MarchingCubes, MarchingCubesParameters
 from glisson.preoperative.vessels.centrelines import Tree, centreline_trees, path_from
 
@@ -93,7 +94,7 @@ def _mouth_side(
         cells = np.argwhere(structures.mask("gallbladder"))
         towards = grid.points_from_indices(cells).mean(axis=0)
     else:
-        depth = ndimage.distance_transform_edt(organ, sampling=grid.spacing_mm)
+        depth = distance_inside(organ, grid.spacing_mm)
         on_line = np.rint(grid.indices_from_points(line.points_mm)).astype(int)
         towards = line.points_mm[int(np.argmin(depth[tuple(on_line.T)]))]
     return np.asarray(towards, dtype=np.float64)
@@ -137,5 +138,5 @@ def _arc_length_reached(curve: Curve, wire: NDArray[np.bool_], grid: Grid) -> fl
 
 def _grown(mask: NDArray[np.bool_], grid: Grid, distance_mm: float) -> NDArray[np.bool_]:
     """The mask and everything within a distance of it."""
-    outside: NDArray[np.bool_] = ndimage.distance_transform_edt(~mask, sampling=grid.spacing_mm) <= distance_mm
+    outside: NDArray[np.bool_] = distance_inside(~mask, grid.spacing_mm) <= distance_mm
     return outside

@@ -20,6 +20,7 @@ from skimage.morphology import skeletonize
 
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.image import Grid
+from glisson.geometry.distance_map import distance_inside
 
 _SPUR = 1.5
 """A side branch shorter than this many radii of the tube that it leaves is a spur of the thinning."""
@@ -87,7 +88,7 @@ def skeleton_points(mask: NDArray[np.bool_], grid: Grid) -> tuple[FloatArray, Fl
         return np.zeros((0, 3)), np.zeros(0)
     filled = np.pad(ndimage.binary_fill_holes(mask[box[0]]), 1)
     cells = np.argwhere(skeletonize(filled))
-    inner = ndimage.distance_transform_edt(filled, sampling=grid.spacing_mm)
+    inner = distance_inside(filled, grid.spacing_mm)
     least = float(grid.spacing_mm.min())
     radii = np.maximum(inner[tuple(cells.T)] - 0.5 * least, 0.5 * least)
     start = np.array([part.start for part in box[0]]) - 1

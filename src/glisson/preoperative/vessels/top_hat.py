@@ -15,6 +15,7 @@ from skimage.filters import threshold_otsu
 
 from glisson.core.parameters import parameter
 from glisson.core.protocols import Progress
+from glisson.geometry.distance_map import distance_inside
 from glisson.preoperative.imaging.diffusion import diffused
 from glisson.preoperative.vessels.tubes import TubeParameters, TubeSegmenter
 
@@ -50,7 +51,7 @@ class TopHat(TubeSegmenter[TopHatParameters]):
         hat = ndimage.white_tophat(smooth, footprint=_ball(chosen.radius_mm / size, 2)[:, :, None])
         progress(0.6, "thresholds")
         found = _above_otsu(hat, within, max(round(chosen.window_mm / size), 2), chosen.floor)
-        found &= ndimage.distance_transform_edt(within, sampling=size) > chosen.margin_mm
+        found &= distance_inside(within, np.full(3, size)) > chosen.margin_mm
         progress(0.9, "clean-up")
         if chosen.ball_mm >= size:
             found = ndimage.binary_opening(found, _ball(chosen.ball_mm / size, 3))

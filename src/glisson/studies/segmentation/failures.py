@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from glisson.core.arrays import FloatArray
+from glisson.geometry.distance_map import distance_inside
 
 KINDS = ("leak", "shrunken", "missing tumour", "shifted", "empty")
 
@@ -67,7 +68,7 @@ def spoilt(kind: str, mask: NDArray[np.bool_], around: Surroundings, random: np.
 
 
 def _leaking(mask: NDArray[np.bool_], around: Surroundings, random: np.random.Generator) -> NDArray[np.bool_] | None:
-    near = ndimage.distance_transform_edt(~mask, sampling=around.spacing_mm) <= _TOUCHING_MM
+    near = distance_inside(~mask, around.spacing_mm) <= _TOUCHING_MM
     touching = [neighbour & ~mask for neighbour in around.neighbours if (neighbour & near & ~mask).any()]
     if not touching:
         return None
@@ -94,7 +95,7 @@ def _shrunken(mask: NDArray[np.bool_], around: Surroundings, random: np.random.G
     found, by, count = mask.copy(), random.uniform(*_INSIDE_MM), int(random.integers(*_RUN))
     first = _any_slice(mask, random)
     for k in range(first, min(first + count, mask.shape[2])):
-        found[:, :, k] = ndimage.distance_transform_edt(mask[:, :, k], sampling=around.spacing_mm[:2]) > by
+        found[:, :, k] = distance_inside(mask[:, :, k], around.spacing_mm[:2]) > by
     return found
 
 
@@ -104,7 +105,7 @@ def _without_tumour(
     if not around.tumours:
         return None
     tumour = around.tumours[int(random.integers(len(around.tumours)))]
-    kept: NDArray[np.bool_] = ndimage.distance_transform_edt(~tumour, sampling=around.spacing_mm) > _COVER_MM
+    kept: NDArray[np.bool_] = distance_inside(~tumour, around.spacing_mm) > _COVER_MM
     return mask & kept
 
 

@@ -20,7 +20,7 @@ from glisson.phantom.phantom import Phantom
 from glisson.phantom.scan import Anatomy
 from glisson.preoperative.imaging.ct import smoothed_ct
 from glisson.preoperative.imaging.working_grid import WorkingGrid
-from glisson.preoperative.liver.intensity_prior import estimate_prior
+from glisson.preoperative.liver.intensity_prior import IntensityPrior, organ_prior
 from glisson.preoperative.liver.seeded_contour import SeededContour, SeededContourParameters
 from glisson.preoperative.liver.slice_flags import suspicious_slices
 from glisson.studies.point import Outcome, Task
@@ -33,6 +33,9 @@ EXAMINE = Task(
 )  # fmt: skip
 
 _NEIGHBOURS = ("heart", "stomach wall", "duodenum", "colon", "spleen", "kidney")
+_SOUND, _SOUND_MM2 = 0.1, 200.0
+"""A slice is right where no more than this share of its area, or this area, is wrong."""
+
 _NO_CLICK = np.zeros((0, 3))
 
 
@@ -53,12 +56,12 @@ def examine_scan(inputs: Mapping[str, Any], folder: Path) -> Outcome:
         "runs": [],
         "flags": [],
     }
-    found = None
+    found = {}
     for start, seeds in starts.items():
-        run, found = _segmented(phantom, seeds)
+        run, found[start] = _segmented(phantom, seeds)
         values["runs"].append({"start": start, **run})
-    if found is not None and inputs["modality"] == "CT":
-        values["flags"] = [*_flag_rows(phantom, anatomy, found, click)]
+    if inputs["modality"] == "CT" and (mask := found["one click"]) is not None:
+        values["flags"] = _flag_rows(phantom, anatomy, mask)
     return Outcome(values)
 
 
@@ -91,20 +94,19 @@ def _segmented(phantom: Phantom, seeds: FloatArray) -> tuple[dict[str, Any], NDA
     }, mask
 
 
-def _flag_rows(phantom: Phantom, anatomy: Anatomy, found: NDArray[np.bool_], click: FloatArray) -> list[dict[str, Any]]:
+def _flag_rows(phantom: Phantom, anatomy: Anatomy, found: NDArray[np.bool_]) -> list[dict[str, Any]]:
     """For each kind of failure how many of the failed and of the good slices are flagged."""
     grid = phantom.volume.grid
     working = WorkingGrid.of(grid, SeededContourParameters().resolution_mm)
     smooth = smoothed_ct(phantom.volume, working)
-    prior = estimate_prior(smooth, working.spacing_mm, [working.working_index(grid.indices_from_points(click)[0])])
-    if prior is None:
-        return []
+    mask, truth = (working.working(one) >= 0.5 for one in (found, phantom.organ.mask("liver")))
+    prior = organ_prior(smooth, mask, working.spacing_mm, IntensityPrior(float(np.median(smooth[mask])), 0.0))
+    sound = _sound_slices(mask, truth, working.spacing_mm)
     around = Surroundings(
         neighbours=[working.working(one) >= 0.5 for one in neighbour_masks(anatomy, grid)],
         tumours=[working.working(phantom.tumours.mask(name)) >= 0.5 for name in phantom.tumours.names.values()],
         spacing_mm=working.spacing_mm,
     )
-    mask = working.working(found) >= 0.5
     rows = []
     for count, kind in enumerate(KINDS):
         failure = spoilt(kind, mask, around, np.random.default_rng([phantom.seed, 31, count]))
@@ -115,11 +117,18 @@ def _flag_rows(phantom: Phantom, anatomy: Anatomy, found: NDArray[np.bool_], cli
                     "failure": kind,
                     "failed": len(failure.failed),
                     "failed_flagged": len(failure.failed & flagged),
-                    "good": len(failure.good),
-                    "good_flagged": len(failure.good & flagged),
+                    "good": len(failure.good & sound),
+                    "good_flagged": len(failure.good & sound & flagged),
                 }
             )
     return rows
+
+
+def _sound_slices(mask: NDArray[np.bool_], truth: NDArray[np.bool_], spacing_mm: FloatArray) -> set[int]:
+    """Slices that are right already: a flag on another one is no false alarm, though nothing was put into it."""
+    pixel = float(np.prod(spacing_mm[:2]))
+    wrong, areas = ((one.sum(axis=(0, 1)) * pixel) for one in (mask ^ truth, truth))
+    return set(np.flatnonzero(wrong <= np.maximum(_SOUND * areas, _SOUND_MM2)).tolist())
 
 
 def neighbour_masks(anatomy: Anatomy, grid: Grid) -> list[NDArray[np.bool_]]:
