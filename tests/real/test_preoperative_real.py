@@ -93,4 +93,4 @@ def test_totalsegmentator_labels_and_one_click(shared_data: Path, capsys: pytest
     found = SeededContour(SeededContourParameters()).segment(volume, None, inside).labels.mask("liver")
     with capsys.disabled():
         print(f"\nTotalSegmentator's CT from one click: Dice {dice(found, reference):.3f} against its automatic labels")
-    assert dice(found, reference) > 0.92
+    assert dice(found, reference) > 0.93
