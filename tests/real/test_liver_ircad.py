@@ -15,6 +15,7 @@ from glisson.io.dicom import read_dicom_mask
 from glisson.io.images import read_volume
 from glisson.preoperative.correction.clicked_mask import Click, ClickedMask
 from glisson.preoperative.correction.correcting import Correcting
+from glisson.preoperative.correction.drawn_slices import DrawnSlices
 from glisson.preoperative.liver.seeded_contour import SeededContour, SeededContourParameters
 
 pytestmark = pytest.mark.real
@@ -104,13 +105,23 @@ def worst_place(wrong: Mask, spacing_mm: np.ndarray) -> np.ndarray:
 def test_a_tenth_of_the_slices_corrected(
     scan: tuple[Volume, Mask], automatic: Mask, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """Each slice where the program suggests it after those before; 0.975, 0.8 mm and 3 mm are aimed at."""
+    """Each slice where the program suggests it after those before; what they teach counts at the end."""
     volume, true = scan
     box = (*ndimage.find_objects((automatic | true).any(axis=2).astype(np.uint8))[0], slice(None))
     correcting = Correcting(automatic[box], volume.grid.spacing_mm)
     for _ in range(round(0.1 * true.any(axis=(0, 1)).sum())):
         number = correcting.suggest()
         correcting.correct(number, true[box][:, :, number])
-    corrected = np.zeros_like(true)
-    corrected[box] = correcting.mask
-    check(f"slices {correcting.corrected} corrected", corrected, scan, (0.97, 1.05, 3.5), capfd)
+    followed = DrawnSlices(automatic, true, correcting.corrected, volume.grid).followed(volume)
+    check(f"slices {correcting.corrected} drawn", followed, scan, (0.975, 0.8, 3.0), capfd)
+
+
+def test_a_contour_for_each_group_of_slices(
+    scan: tuple[Volume, Mask], automatic: Mask, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The dissertation's own mode: six groups of about 20 slices, a contour on the middle of each."""
+    volume, true = scan
+    own = np.flatnonzero(true.any(axis=(0, 1)))
+    middles = np.linspace(own[0], own[-1] + 1, 13)[1::2].astype(int).tolist()
+    followed = DrawnSlices(automatic, true, middles, volume.grid).followed(volume)
+    check(f"contours in slices {middles}", followed, scan, (0.96, 2.0, 10.0), capfd)

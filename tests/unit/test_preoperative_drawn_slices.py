@@ -1,14 +1,19 @@
 """Slices drawn in a mask, on livers of the phantom family whose automatic masks are wrong in known ways."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from scipy import ndimage
 
-from glisson.core import Grid
+from glisson.core import Grid, Volume
 from glisson.core.errors import BadInput
 from glisson.framework.segmentation_scores import SegmentationScores, segmentation_scores
+from glisson.phantom.appearance import Appearance, draw_ct, draw_mr
+from glisson.phantom.family import make_phantom
 from glisson.phantom.liver_shape import build_shape
 from glisson.phantom.proportions import draw_proportions
+from glisson.preoperative.contours.signed_distance import signed_distance_of_mask
 from glisson.preoperative.correction.correcting import Correcting
 from glisson.preoperative.correction.drawn_slices import DrawnSlices
 from preoperative_shapes import dice
@@ -80,6 +85,28 @@ def test_six_contours_at_even_distances_are_followed(livers: list[Liver]) -> Non
     before, after = scores_of([automatic for automatic, _, _ in livers], livers), scores_of(masks, livers)
     assert all(a.dice > b.dice for a, b in zip(after, before, strict=True))
     assert np.median([a.asd_mm for a in after]) < np.median([b.asd_mm for b in before])
+
+
+@pytest.mark.parametrize(("member", "draw"), [(300, draw_ct), (301, draw_ct), (304, draw_mr)])
+def test_the_scan_teaches_more_than_the_shape(member: int, draw: Callable[[int], Appearance]) -> None:
+    """Six slices drawn of a mask that wanders: too small here, too large there."""
+    phantom = make_phantom(member, (2.5, 2.5, 3.0), appearance=draw(member))
+    true, grid = phantom.organ.mask("liver"), phantom.volume.grid
+    wander = ndimage.gaussian_filter(np.random.default_rng(member).normal(size=true.shape), 5.0)
+    automatic = signed_distance_of_mask(true, grid.spacing_mm) < 5.0 * wander / wander.std()
+    own = np.flatnonzero(true.any(axis=(0, 1)))
+    middles = np.linspace(own[0], own[-1] + 1, 13)[1::2].astype(int).tolist()
+    slices = DrawnSlices(automatic, true, middles, grid)
+    followed = slices.followed(phantom.volume)
+    assert 1.0 - dice(followed, true) < 0.5 * (1.0 - dice(slices.mask, true))
+    np.testing.assert_array_equal(followed[:, :, middles], true[:, :, middles])
+
+
+def test_two_drawn_slices_teach_shape_only(livers: list[Liver]) -> None:
+    automatic, true, grid = livers[0]
+    slices = DrawnSlices(automatic, true, (20, 30), grid)
+    nothing = Volume(np.zeros(grid.shape, dtype=np.int16), grid)
+    np.testing.assert_array_equal(slices.followed(nothing), slices.mask)
 
 
 def test_the_way_a_scan_is_stored_does_not_matter(livers: list[Liver]) -> None:

@@ -55,8 +55,8 @@ def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
         progress = lines.begun("correct", "clicks were given")
         before, after = correct_by_clicks(case, arguments.clicks, progress)
     else:
-        lines.begun("correct", "drawn slices were given")
-        before, after = correct_by_slices(case, arguments.slices, arguments.numbers)
+        progress = lines.begun("correct", "drawn slices were given")
+        before, after = correct_by_slices(case, arguments.slices, arguments.numbers, progress)
     seconds = time.perf_counter() - started
     lines.ended("correct", seconds)
     values = {"volume_ml": after, "volume_before_ml": before, "clicks": len(arguments.clicks or ()), "seconds": seconds}

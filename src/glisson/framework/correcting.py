@@ -36,20 +36,24 @@ def correct_by_clicks(case: Case, clicks: Sequence[Click], progress: Progress = 
     return _replaced(case, before, clicked.mask)
 
 
-def correct_by_slices(case: Case, drawn: str | Path, numbers: Sequence[int] | None) -> tuple[float, float]:
+def correct_by_slices(
+    case: Case, drawn: str | Path, numbers: Sequence[int] | None, progress: Progress = silent
+) -> tuple[float, float]:
     """Take slices of a drawn mask as right, let the others follow, and tell the volumes (ml) before and after.
 
     Args:
         case: the case; the mask before stays beside the new one, and the stages after it are out of date then.
         drawn: a label map with "liver", or with a single label, on the scan's grid.
         numbers: which of its slices are right; None: all that have a voxel.
+        progress: told how far it is.
 
     Raises:
         BadInput: the case has no mask, or the drawn one cannot be used.
         WriteFailed: the disk is full.
     """
     before = _mask_before(case)
-    return _replaced(case, before, _drawn_slices(before, drawn, numbers).mask)
+    slices = _drawn_slices(before, drawn, numbers)
+    return _replaced(case, before, slices.followed(read_volume(case.path(SCAN)), progress))
 
 
 def suggest_slices(case: Case, count: int, drawn: str | Path | None, numbers: Sequence[int] | None) -> tuple[int, ...]:

@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glisson.core.errors import BadInput
-from glisson.core.image import Grid
+from glisson.core.image import Grid, Volume
+from glisson.core.protocols import Progress, silent
 from glisson.preoperative.correction.correcting import Correcting
+from glisson.preoperative.correction.learned_outline import FEWEST_SLICES, learned_outline
 from glisson.preoperative.imaging.axial import slice_axis
 
 _MARGIN_MM = 10.0
@@ -30,7 +32,7 @@ class DrawnSlices:
     def __init__(
         self, automatic: NDArray[np.bool_], drawn: NDArray[np.bool_], numbers: Sequence[int] | None, grid: Grid
     ) -> None:
-        self._automatic, self._axis = automatic, slice_axis(grid)
+        self._automatic, self._drawn, self._axis = automatic, drawn, slice_axis(grid)
         slices = np.moveaxis(drawn, self._axis, 2)
         if numbers is None:
             numbers = np.flatnonzero(slices.any(axis=(0, 1))).tolist()
@@ -49,9 +51,20 @@ class DrawnSlices:
         """Numbers of the drawn slices, in order."""
         return self._correcting.corrected
 
+    def followed(self, volume: Volume, progress: Progress = silent) -> NDArray[np.bool_]:
+        """The mask [i, j, k] whose slices have followed what the drawn ones teach about the scan; few teach shape only.
+
+        Args:
+            volume: the CT or MR, on the masks' grid.
+            progress: told how far it is.
+        """
+        if len(self.numbers) < FEWEST_SLICES:
+            return self.mask
+        return learned_outline(volume, self._automatic, self._drawn, self.numbers, progress)
+
     @property
     def mask(self) -> NDArray[np.bool_]:
-        """The mask [i, j, k] whose slices have followed the drawn ones."""
+        """The mask [i, j, k] whose slices have followed the drawn ones by shape alone."""
         result = np.zeros_like(self._automatic)
         np.moveaxis(result, self._axis, 2)[self._box] = self._correcting.mask
         return result
