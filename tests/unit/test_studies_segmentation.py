@@ -99,13 +99,12 @@ def test_the_conclusion_has_distributions_and_recall() -> None:
     assert b"No organ" in conclusion.files["report.html"]
 
 
-def test_the_command_examines_a_coarse_scan(
+def test_the_command_examines_a_scan(
     glisson: Callable[..., tuple[int, dict[str, Any]]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(command, "LocalPool", InThisProcess)
     monkeypatch.setattr("glisson.studies.segmentation.study.QUICK_CTS", 1)
     monkeypatch.setattr("glisson.studies.segmentation.study.QUICK_MRS", 0)
-    monkeypatch.setattr("glisson.studies.segmentation.study.QUICK_SPACING_MM", (3.0, 3.0, 4.0))
     code, said = glisson("study", "segmentation", "--quick", "--out", tmp_path)
     assert code == 0, said["message"]
     assert said["failed"] == []

@@ -24,6 +24,9 @@ _PASSAGE_PER_HU = 0.08
 _WIDEST_PASSAGE = 0.9
 """ … but a passage about as wide as the smaller basin is no passage between two organs, whatever their HU."""
 
+_HEART_SHARE, _HEART_MM = 0.95, 18.0
+"""A basin is the heart where so much of it lies between the lungs, and it holds a ball of this radius."""
+
 _VESSEL_AREA_MM2 = 250.0
 """Gaps of the band that are surrounded in a plane and smaller than this are vessels or small tumours."""
 
@@ -37,6 +40,7 @@ def reachable_region(
     spacing_mm: FloatArray,
     seeds: list[tuple[int, int, int]],
     detail_mm: float = 6.0,
+    thorax: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.bool_]:
     """The organ as far as grey value and shape tell it, (a, b, c); empty when no tissue is near the seeds.
 
@@ -46,6 +50,7 @@ def reachable_region(
         spacing_mm: voxel spacing (3,).
         seeds: voxels clicked; the basins nearest to them are the organ's.
         detail_mm: radius below which what hangs on the organ is taken for something else (opening).
+        thorax: where a wide body is the heart (`between_lungs`), if that is known.
     """
     band = np.abs(smooth - prior.mean) < prior.half_width
     filled = _without_vessel_gaps(band, spacing_mm) & (smooth > SOFT_TISSUE_HU[0])
@@ -58,7 +63,8 @@ def reachable_region(
         return np.zeros(band.shape, dtype=bool)
     basins = watershed(-width, markers, mask=filled).astype(np.int64)
     values = np.where(band, smooth, np.float32(prior.mean))
-    joined = _joined_basins(basins, count, width, values)
+    hearts = np.zeros(count + 1, dtype=bool) if thorax is None else _hearts(basins, count, width, thorax)
+    joined = _joined_basins(basins, count, width, values, hearts)
     own = {int(joined[_nearest_label(basins, seed, spacing_mm)]) for seed in seeds}
     region = np.isin(joined[basins], list(own)) & (basins > 0)
     return opened(region, spacing_mm, detail_mm)
@@ -88,18 +94,33 @@ def _without_vessel_gaps(band: NDArray[np.bool_], spacing_mm: FloatArray) -> NDA
     return filled
 
 
-def _joined_basins(basins: IntArray, count: int, width: FloatArray, values: NDArray[np.float32]) -> IntArray:
+def _hearts(basins: IntArray, count: int, width: FloatArray, thorax: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Whether each basin 0 … count is a wide body that lies between the lungs as a whole."""
+    inside = np.bincount(basins[thorax], minlength=count + 1)
+    size = np.bincount(basins.ravel(), minlength=count + 1)
+    widest = np.zeros(count + 1)
+    np.maximum.at(widest, basins[thorax], width[thorax])
+    hearts: NDArray[np.bool_] = (inside > _HEART_SHARE * size) & (widest > _HEART_MM)
+    return hearts
+
+
+def _joined_basins(
+    basins: IntArray, count: int, width: FloatArray, values: NDArray[np.float32], hearts: NDArray[np.bool_]
+) -> IntArray:
     """For each basin 0 … count the number of the group that it is joined to, (count + 1,)."""
     numbers = np.arange(count + 1)
     widest, level, size = _basin_properties(basins, count, width, values)
-    group = numbers.copy()
+    group, heart = numbers.copy(), hearts.copy()
     for passage, first, second in _passages(basins, count, width):
         a, b = _root(group, first), _root(group, second)
         if a == b:
             continue
         needed = min(_NARROWEST_PASSAGE + _PASSAGE_PER_HU * abs(level[a] - level[b]), _WIDEST_PASSAGE)
+        if heart[a] != heart[b]:
+            needed = _WIDEST_PASSAGE
         if passage >= needed * min(widest[a], widest[b]):
             group[b] = a
+            heart[a] |= heart[b]
             widest[a] = max(widest[a], widest[b])
             level[a] = (level[a] * size[a] + level[b] * size[b]) / (size[a] + size[b])
             size[a] += size[b]

@@ -30,6 +30,7 @@ from glisson.preoperative.imaging.ct import smoothed_ct
 from glisson.preoperative.imaging.mr import smoothed_mr
 from glisson.preoperative.imaging.working_grid import WorkingGrid
 from glisson.preoperative.liver.automatic_start import Start, find_start
+from glisson.preoperative.liver.between_lungs import between_lungs
 from glisson.preoperative.liver.completion import surface_tumours, without_gaps
 from glisson.preoperative.liver.fine_border import fine_border
 from glisson.preoperative.liver.intensity_prior import IntensityPrior, estimate_prior
@@ -107,9 +108,11 @@ class SeededContour:
         progress(0.05, "region")
         tumours = grid.working(known) >= 0.5
         start = _start(smooth, volume, grid, needed=not clicked)
-        found = None if start is None else _region_about(smooth, grid, [_place(start, volume.grid, grid)], tumours)
+        thorax = between_lungs(smooth, grid, volume.grid) if volume.modality == "CT" else None
+        scene = _Scene(smooth, grid.spacing_mm, tumours, thorax)
+        found = None if start is None else _region_about(scene, [_place(start, volume.grid, grid)])
         if clicked and (found is None or not _holds(found[0], clicked, grid)):
-            found = _region_about(smooth, grid, clicked, tumours)
+            found = _region_about(scene, clicked)
         if found is None:
             raise BadInput("There is no soft tissue about the click; click inside the liver.")
         region, prior = found
@@ -159,19 +162,42 @@ def _known_tumours(volume: Volume, labels: LabelMap | None) -> NDArray[np.bool_]
     return labels.mask(*names)
 
 
+@dataclass(frozen=True, eq=False)
+class _Scene:
+    """What a region is found in: smoothed values, voxel spacing, known tumours, and where a wide body is the heart."""
+
+    smooth: NDArray[np.float32]
+    spacing_mm: FloatArray
+    tumours: NDArray[np.bool_]
+    thorax: NDArray[np.bool_] | None
+
+    def reachable(
+        self, tumours: NDArray[np.bool_], prior: IntensityPrior, clicked: list[tuple[int, int, int]]
+    ) -> NDArray[np.bool_]:
+        """The reachable region with tumours, which may hide liver that lies behind them."""
+        healed = np.where(tumours, np.float32(prior.mean), self.smooth)
+        reached = reachable_region(healed, prior, self.spacing_mm, clicked, thorax=self.thorax)
+        return reached | tumours if reached.any() else reached
+
+
 def _region_about(
-    smooth: NDArray[np.float32],
-    grid: WorkingGrid,
-    clicked: list[tuple[int, int, int]],
-    tumours: NDArray[np.bool_],
+    scene: _Scene, clicked: list[tuple[int, int, int]]
 ) -> tuple[NDArray[np.bool_], IntensityPrior] | None:
     """The organ's region about clicks, and its grey values; None where there is no soft tissue."""
-    local = estimate_prior(smooth, grid.spacing_mm, clicked)
+    smooth, spacing_mm = scene.smooth, scene.spacing_mm
+    local = estimate_prior(smooth, spacing_mm, clicked)
     if local is None:
         return None
-    prior = settled_prior(smooth, local, grid.spacing_mm, clicked)
-    region = _region_with_tumours(smooth, prior, grid.spacing_mm, clicked, tumours)
-    return without_gaps(region, smooth, grid.spacing_mm, _GAP_MM), prior
+    prior = settled_prior(smooth, local, spacing_mm, clicked, scene.thorax)
+    tumours = scene.tumours
+    region = scene.reachable(tumours, prior, clicked)
+    for _ in range(_TUMOUR_ROUNDS):
+        found = surface_tumours(region, smooth, prior, spacing_mm)
+        if not found.any():
+            break
+        tumours = tumours | found
+        region = scene.reachable(tumours, prior, clicked)
+    return without_gaps(region, smooth, spacing_mm, _GAP_MM), prior
 
 
 def _holds(region: NDArray[np.bool_], clicked: list[tuple[int, int, int]], grid: WorkingGrid) -> bool:
@@ -180,37 +206,6 @@ def _holds(region: NDArray[np.bool_], clicked: list[tuple[int, int, int]], grid:
         return False
     away = distance_inside(~region, grid.spacing_mm)
     return all(away[index] <= _NEAR_MM for index in clicked)
-
-
-def _region_with_tumours(
-    smooth: NDArray[np.float32],
-    prior: IntensityPrior,
-    spacing_mm: FloatArray,
-    clicked: list[tuple[int, int, int]],
-    known: NDArray[np.bool_],
-) -> NDArray[np.bool_]:
-    """The reachable region with known and surface tumours; a tumour may hide liver that lies behind it."""
-    tumours = known
-    region = _reachable_with(tumours, smooth, prior, spacing_mm, clicked)
-    for _ in range(_TUMOUR_ROUNDS):
-        found = surface_tumours(region, smooth, prior, spacing_mm)
-        if not found.any():
-            break
-        tumours = tumours | found
-        region = _reachable_with(tumours, smooth, prior, spacing_mm, clicked)
-    return region
-
-
-def _reachable_with(
-    tumours: NDArray[np.bool_],
-    smooth: NDArray[np.float32],
-    prior: IntensityPrior,
-    spacing_mm: FloatArray,
-    clicked: list[tuple[int, int, int]],
-) -> NDArray[np.bool_]:
-    healed = np.where(tumours, np.float32(prior.mean), smooth)
-    reached = reachable_region(healed, prior, spacing_mm, clicked)
-    return reached | tumours if reached.any() else reached
 
 
 def _smoothed(

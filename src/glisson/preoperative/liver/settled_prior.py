@@ -21,7 +21,11 @@ _COARSE_MM = 3.0
 
 
 def settled_prior(
-    smooth: NDArray[np.float32], prior: IntensityPrior, spacing_mm: FloatArray, clicked: list[tuple[int, int, int]]
+    smooth: NDArray[np.float32],
+    prior: IntensityPrior,
+    spacing_mm: FloatArray,
+    clicked: list[tuple[int, int, int]],
+    thorax: NDArray[np.bool_] | None = None,
 ) -> IntensityPrior:
     """The organ's grey values, from those about a click; the same where the click's give no region.
 
@@ -30,13 +34,17 @@ def settled_prior(
         prior: what the surroundings of the clicks have.
         spacing_mm: voxel spacing (3,).
         clicked: voxels clicked.
+        thorax: as for `reachable_region`.
     """
     steps = np.maximum(np.rint(_COARSE_MM / spacing_mm), 1).astype(int)
-    coarse, spacing = smooth[tuple(slice(None, None, step) for step in steps)], spacing_mm * steps
+    every = tuple(slice(None, None, step) for step in steps)
+    coarse, spacing = smooth[every], spacing_mm * steps
+    between = None if thorax is None else thorax[every]
     seeds = [_coarse_index(index, steps, coarse.shape) for index in clicked]
     for _ in range(_ROUNDS):
         before = prior
-        prior = organ_prior(coarse, reachable_region(coarse, before, spacing, seeds), spacing, before)
+        region = reachable_region(coarse, before, spacing, seeds, thorax=between)
+        prior = organ_prior(coarse, region, spacing, before)
         if max(abs(prior.mean - before.mean), abs(prior.deviation - before.deviation)) < _SETTLED:
             break
     return prior
