@@ -102,11 +102,13 @@ def _before_vein(points, start, end):
 
 
 def _caudate(phantom):
-    """The foremost, leftmost and rightmost points of segment 1, on its voxels' outer faces."""
+    """The outermost points of segment 1, on its voxels' outer faces, but for its back."""
     points = phantom.couinaud.grid.points_from_indices(np.argwhere(phantom.couinaud.voxels == 1))
     half = 0.5 * phantom.couinaud.grid.spacing_mm
     return {
         "caudate left": points[points[:, 0].argmax()] + [half[0], 0.0, 0.0],
         "caudate right": points[points[:, 0].argmin()] - [half[0], 0.0, 0.0],
         "caudate front": points[points[:, 1].argmin()] - [0.0, half[1], 0.0],
+        "caudate top": points[points[:, 2].argmax()] + [0.0, 0.0, half[2]],
+        "caudate bottom": points[points[:, 2].argmin()] - [0.0, 0.0, half[2]],
     }

@@ -16,6 +16,7 @@ UMBILICAL, RIGHT_PORTAL, LEFT_PORTAL = "umbilical portion", "right portal plane"
 RIGHT_VEIN, MIDDLE_VEIN, LEFT_VEIN = "RHV", "MHV", "LHV"
 RIGHT_FISSURE, GALLBLADDER_FOSSA, UMBILICAL_FISSURE = "right fissure", "gallbladder fossa", "umbilical fissure"
 CAVA, CAUDATE_LEFT, CAUDATE_RIGHT, CAUDATE_FRONT = "IVC", "caudate left", "caudate right", "caudate front"
+CAUDATE_TOP, CAUDATE_BOTTOM = "caudate top", "caudate bottom"
 BRANCHES = {f"P{number}": number for number in range(2, 9)}
 """Landmark on a segment's portal branch → the segment."""
 
@@ -35,6 +36,8 @@ PLACES = {
     CAUDATE_LEFT: "the leftmost point of the caudate lobe",
     CAUDATE_RIGHT: "the rightmost point of the caudate lobe",
     CAUDATE_FRONT: "the foremost point of the caudate lobe",
+    CAUDATE_TOP: "the uppermost point of the caudate lobe; may be left out",
+    CAUDATE_BOTTOM: "the lowest point of the caudate lobe; may be left out",
     **{name: f"the portal branch of segment {number}; may be repeated" for name, number in BRANCHES.items()},
 }
 """Name of each landmark and where it lies."""
