@@ -1,6 +1,8 @@
 import json
 import os
+import shutil
 import signal
+import tarfile
 import tracemalloc
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -27,6 +29,17 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"real data not found at {folder} (set GLISSON_SHARED_DATA)")
     return folder
+
+
+@pytest.fixture(scope="session")
+def ircad(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Folder of 3D-IRCADb-01 case 17, unpacked (PATIENT_DICOM, MASKS_DICOM); nothing of it outlives the tests."""
+    folder = tmp_path_factory.mktemp("ircad")
+    for name in ("PATIENT_DICOM", "MASKS_DICOM"):
+        with tarfile.open(shared_data / "research-only" / "ircadb01-case17" / f"{name}.tar.xz") as archive:
+            archive.extractall(folder, filter="data")
+    yield folder
+    shutil.rmtree(folder)
 
 
 @pytest.fixture(scope="session")
