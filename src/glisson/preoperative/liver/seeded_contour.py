@@ -117,7 +117,7 @@ class SeededContour:
             raise BadInput("There is no soft tissue about the click; click inside the liver.")
         region, prior = found
         _require_volume(region, grid, seeds_mm if start is None or clicked else start.point_mm[None])
-        organ, flags = self._contoured(smooth, region, prior, grid, progress)
+        organ, flags = self._contoured(scene, region, prior, grid, progress)
         on_scan = fine_border(volume, organ, smooth, prior, grid) if volume.modality == "CT" else grid.full(organ)
         full = ndimage.binary_fill_holes(on_scan | known)
         flags += [(border.slice_near(volume.grid), border.sentence) for border in touched_borders(full)]
@@ -126,14 +126,14 @@ class SeededContour:
 
     def _contoured(
         self,
-        smooth: NDArray[np.float32],
+        scene: "_Scene",
         region: NDArray[np.bool_],
         prior: IntensityPrior,
         grid: WorkingGrid,
         progress: Progress,
     ) -> tuple[NDArray[np.bool_], list[tuple[int, str]]]:
         """The contours' mask, cleaned in 3-D, and the slices that look wrong (the scan's numbers)."""
-        chosen = self._parameters
+        chosen, smooth = self._parameters, scene.smooth
         forces = LocalizedContourParameters(
             energy=chosen.energy,
             radius_mm=chosen.radius_mm,
@@ -148,7 +148,7 @@ class SeededContour:
         progress(0.9, "clean-up")
         voxel = float(grid.spacing_mm.max())
         cleaned = opened(without_gaps(mask, smooth, grid.spacing_mm, _GAP_MM), grid.spacing_mm, voxel)
-        flags = flag_slices(contours, cleaned, smooth, prior, grid)
+        flags = flag_slices(contours, cleaned, smooth, prior, grid, scene.thorax)
         return cleaned, flags
 
 

@@ -6,7 +6,8 @@ is there, or is not, for a few slices only is suspicious: a leak comes and goes,
 tumour leaves a gap between the slices above and below, if the gap holds tissue and no fat (the residues of opening
 and closing by a line along the slices' axis; Serra 1982). A part of other grey values is a vessel or a tumour where
 the organ encloses it, and else a neighbour. And where much of the surroundings looks like the organ, its border was
-guessed.
+guessed. Last, what is as bright as the organ but hangs on it by a narrow passage only, or is the heart, was not reached
+by the region that the contours start from (`reachable`), and is a leak wherever it goes.
 """
 
 from collections import defaultdict
@@ -21,6 +22,7 @@ from glisson.geometry.distance_map import distance_inside
 from glisson.preoperative.imaging.working_grid import WorkingGrid
 from glisson.preoperative.liver.intensity_prior import IntensityPrior
 from glisson.preoperative.liver.propagation import SliceContour
+from glisson.preoperative.liver.reachable import reachable_region
 
 _HELD = 0.3
 """Fraction of a contour at its outer limit above which it wants to leave the organ."""
@@ -55,6 +57,9 @@ _ENCLOSED_SHARE = 0.65
 _RIND_MM = 3.5
 """What surrounds a part is looked at so far around it."""
 
+_BESIDE_MM = 4.0
+"""The region ends so near to the organ's border, or nearer."""
+
 _FAINT = 0.35
 """Fraction of a slice's surroundings with the organ's own grey values above which its border is guessed."""
 
@@ -71,6 +76,7 @@ def flag_slices(
     smooth: NDArray[np.float32],
     prior: IntensityPrior,
     grid: WorkingGrid,
+    thorax: NDArray[np.bool_] | None = None,
 ) -> list[tuple[int, str]]:
     """Slices (the scan's numbers) with a sentence each.
 
@@ -80,8 +86,9 @@ def flag_slices(
         smooth: smoothed grey values there.
         prior: the organ's grey values.
         grid: the working grid.
+        thorax: as for `suspicious_slices`.
     """
-    reasons = suspicious_slices(mask, smooth, prior, grid.spacing_mm)
+    reasons = suspicious_slices(mask, smooth, prior, grid.spacing_mm, thorax)
     areas = mask.sum(axis=(0, 1)) * float(np.prod(grid.spacing_mm[:2]))
     for k, contour in contours.items():
         reasons[k] += _contour_reasons(contour, float(areas[k]), float(grid.spacing_mm[:2].mean()))
@@ -94,7 +101,11 @@ def flag_slices(
 
 
 def suspicious_slices(
-    mask: NDArray[np.bool_], smooth: NDArray[np.float32], prior: IntensityPrior, spacing_mm: FloatArray
+    mask: NDArray[np.bool_],
+    smooth: NDArray[np.float32],
+    prior: IntensityPrior,
+    spacing_mm: FloatArray,
+    thorax: NDArray[np.bool_] | None = None,
 ) -> Reasons:
     """What looks wrong in a mask, whatever made it; an empty one is not judged.
 
@@ -103,6 +114,7 @@ def suspicious_slices(
         smooth: smoothed grey values, same shape.
         prior: the organ's grey values.
         spacing_mm: voxel spacing (3,).
+        thorax: where a wide body is the heart (`between_lungs`), if that is known.
     """
     reasons: Reasons = defaultdict(list)
     slices = np.flatnonzero(mask.any(axis=(0, 1)))
@@ -115,6 +127,7 @@ def suspicious_slices(
     # A gap would make what is above and below look short-lived.
     extra = (mask | gaps) & (_heights(mask | gaps) <= few) & mask
     foreign = _foreign(mask, smooth, prior, spacing_mm).sum(axis=(0, 1)) * pixel_mm2
+    apart = _not_reached(mask, smooth, prior, spacing_mm, thorax)
     for k in range(int(slices[0]), int(slices[-1]) + 1):
         here = mask[:, :, k]
         if not here.any():
@@ -128,6 +141,9 @@ def suspicious_slices(
             reasons[k].append(f"leak suspected: {beyond:.0f} mm² are there in a few slices only")
         if foreign[k] > _FOREIGN_MM2:
             reasons[k].append(f"leak suspected: {foreign[k]:.0f} mm² at the border have other grey values")
+        unreached = _reached(apart[:, :, k], spacing_mm, _EXTRA_RADIUS_MM).sum() * pixel_mm2
+        if unreached > _EXTRA_MM2:
+            reasons[k].append(f"leak suspected: {unreached:.0f} mm² hang on the organ by a narrow passage only")
         faint = _faint_border(here, smooth[:, :, k], prior, spacing_mm)
         if faint > _FAINT:
             reasons[k].append(f"faint border: {100.0 * faint:.0f} % of the surroundings look like the organ")
@@ -194,6 +210,22 @@ def _foreign(
         if (rind & mask[box]).sum() >= _ENCLOSED_SHARE * rind.sum():
             other[box] &= ~part
     return other
+
+
+def _not_reached(
+    mask: NDArray[np.bool_],
+    smooth: NDArray[np.float32],
+    prior: IntensityPrior,
+    spacing_mm: FloatArray,
+    thorax: NDArray[np.bool_] | None,
+) -> NDArray[np.bool_]:
+    """What of a mask is as bright as the organ, and yet not reached from its middle."""
+    middle = np.unravel_index(int(np.argmax(distance_inside(mask, spacing_mm))), mask.shape)
+    a, b, c = (int(place) for place in middle)
+    region = reachable_region(smooth, prior, spacing_mm, [(a, b, c)], thorax=thorax)
+    alike = np.abs(smooth - prior.mean) < prior.half_width
+    apart: NDArray[np.bool_] = mask & alike & (distance_inside(~region, spacing_mm) > _BESIDE_MM)
+    return apart
 
 
 def _faint_border(

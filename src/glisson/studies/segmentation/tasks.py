@@ -20,6 +20,7 @@ from glisson.phantom.phantom import Phantom
 from glisson.phantom.scan import Anatomy
 from glisson.preoperative.imaging.ct import smoothed_ct
 from glisson.preoperative.imaging.working_grid import WorkingGrid
+from glisson.preoperative.liver.between_lungs import between_lungs
 from glisson.preoperative.liver.intensity_prior import IntensityPrior, organ_prior
 from glisson.preoperative.liver.seeded_contour import SeededContour, SeededContourParameters
 from glisson.preoperative.liver.slice_flags import suspicious_slices
@@ -101,6 +102,7 @@ def _flag_rows(phantom: Phantom, anatomy: Anatomy, found: NDArray[np.bool_]) -> 
     smooth = smoothed_ct(phantom.volume, working)
     mask, truth = (working.working(one) >= 0.5 for one in (found, phantom.organ.mask("liver")))
     prior = organ_prior(smooth, mask, working.spacing_mm, IntensityPrior(float(np.median(smooth[mask])), 0.0))
+    thorax = between_lungs(smooth, working, grid)
     sound = _sound_slices(mask, truth, working.spacing_mm)
     around = Surroundings(
         neighbours=[working.working(one) >= 0.5 for one in neighbour_masks(anatomy, grid)],
@@ -111,7 +113,8 @@ def _flag_rows(phantom: Phantom, anatomy: Anatomy, found: NDArray[np.bool_]) -> 
     for count, kind in enumerate(KINDS):
         failure = spoilt(kind, mask, around, np.random.default_rng([phantom.seed, 31, count]))
         if failure is not None:
-            flagged = {k for k, why in suspicious_slices(failure.mask, smooth, prior, around.spacing_mm).items() if why}
+            reasons = suspicious_slices(failure.mask, smooth, prior, around.spacing_mm, thorax)
+            flagged = {k for k, why in reasons.items() if why}
             rows.append(
                 {
                     "failure": kind,
