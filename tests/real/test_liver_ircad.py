@@ -75,7 +75,7 @@ def test_one_click_anywhere(
         click = volume.grid.points_from_indices(cell[None].astype(float))
         started = perf_counter()
         found = SeededContour(SeededContourParameters()).segment(volume, None, click)
-        what = f"one click at {place_text(click[0])} mm, {perf_counter() - started:.0f} s"
+        what = f"one click at {place_text(click[0])}, {perf_counter() - started:.0f} s"
         check(what, found.labels.mask("liver"), scan, (0.945, 2.0, 10.0), capfd)
 
 
