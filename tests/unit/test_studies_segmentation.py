@@ -69,6 +69,19 @@ def test_failures_are_what_they_say(scene) -> None:
     assert not made["empty"].mask[:, :, empty].any()
 
 
+def test_what_the_organs_middle_does_not_reach_is_told() -> None:
+    """A neighbour as bright as the organ that touches it from top to bottom: only the region knows where that ends."""
+    whole = np.zeros(GRID.shape, dtype=bool)
+    whole[10:50, 10:40, 5:35] = True
+    region = whole.copy()
+    region[38:] = False
+    smooth = np.where(whole, PRIOR.mean, -90.0).astype(np.float32)
+    assert not suspicious_slices(whole, smooth, PRIOR, GRID.spacing_mm, whole)
+    reasons = suspicious_slices(whole, smooth, PRIOR, GRID.spacing_mm, region)
+    assert set(reasons) == set(range(5, 35))
+    assert all("narrow passage" in why for (why,) in reasons.values())
+
+
 def test_where_there_is_no_place_for_a_failure_there_is_none(scene) -> None:
     liver, _, around = scene
     alone = Surroundings([np.zeros_like(liver)], [], around.spacing_mm)

@@ -18,6 +18,7 @@ from glisson.core.image import Volume
 from glisson.core.protocols import Progress, silent
 from glisson.preoperative.contours.signed_distance import signed_distance_of_mask
 from glisson.preoperative.correction.shape_blending import Correction, blended_slice, neighbours
+from glisson.preoperative.imaging.components import largest_part
 from glisson.preoperative.imaging.diffusion import smoothed
 from glisson.preoperative.imaging.working_grid import WorkingGrid
 
@@ -66,7 +67,7 @@ def learned_outline(
     progress(0.6, "learning from the drawn slices")
     inside = _classified(features, before, target, own, blended, part.spacing_mm)
     result = np.zeros_like(automatic)
-    result[place] = _largest(part.full(inside))
+    result[place] = ndimage.binary_fill_holes(largest_part(part.full(inside)))
     for number in numbers:
         slices = (slice(None),) * grid.order[2] + (number,)
         result[slices] = drawn[slices]
@@ -169,10 +170,3 @@ def _classified(
 def _distance(mask: NDArray[np.bool_], spacing_mm: FloatArray) -> NDArray[np.float32]:
     distance = signed_distance_of_mask(mask, spacing_mm)
     return np.clip(distance, -_FARTHEST_MM, _FARTHEST_MM).astype(np.float32)
-
-
-def _largest(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    parts, count = ndimage.label(mask)
-    if count == 0:
-        return mask
-    return np.asarray(ndimage.binary_fill_holes(parts == int(np.argmax(np.bincount(parts.ravel())[1:])) + 1))

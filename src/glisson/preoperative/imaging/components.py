@@ -1,4 +1,4 @@
-"""Connected parts of masks: one organ is one part."""
+"""Connected parts of masks, and what they enclose: one organ is one part."""
 
 from dataclasses import dataclass
 
@@ -26,6 +26,20 @@ class Part:
     def place(self) -> str:
         """Volume and centroid for people."""
         return f"{_volume_text(self.volume_ml)} at {place_text(self.centroid_mm)}"
+
+
+def largest_part(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The largest face-connected part of a mask; empty where that is."""
+    numbered, count = ndimage.label(mask)
+    if count == 0:
+        return mask
+    largest: NDArray[np.bool_] = numbered == int(np.argmax(np.bincount(numbered.ravel())[1:])) + 1
+    return largest
+
+
+def slices_filled(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """A mask (row, column, slice) with all that it encloses in a slice."""
+    return np.stack([ndimage.binary_fill_holes(mask[:, :, k]) for k in range(mask.shape[2])], axis=2)
 
 
 def single_part(mask: NDArray[np.bool_], grid: Grid, what: str) -> tuple[NDArray[np.bool_], tuple[Part, ...]]:

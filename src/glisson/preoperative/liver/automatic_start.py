@@ -16,6 +16,7 @@ from glisson.core.errors import StageFailed
 from glisson.core.image import Grid
 from glisson.core.status import Status
 from glisson.geometry.distance_map import distance_inside
+from glisson.preoperative.imaging.components import largest_part, slices_filled
 from glisson.preoperative.imaging.working_grid import WorkingGrid
 
 _COARSE_MM = 3.0
@@ -117,14 +118,7 @@ def _likely_places(coarse: NDArray[np.float32], spacing_mm: FloatArray, points: 
 
 def _body(coarse: NDArray[np.float32]) -> NDArray[np.bool_]:
     """The patient with his lungs, without the table: largest part of what is no air, filled slice by slice."""
-    tissue = ndimage.binary_opening(coarse > _AIR_HU, iterations=2)
-    parts, count = ndimage.label(tissue)
-    if count == 0:
-        return np.zeros(coarse.shape, dtype=bool)
-    body: NDArray[np.bool_] = parts == int(np.argmax(np.bincount(parts.ravel())[1:])) + 1
-    for k in range(body.shape[2]):
-        body[:, :, k] = ndimage.binary_fill_holes(body[:, :, k])
-    return body
+    return slices_filled(largest_part(ndimage.binary_opening(coarse > _AIR_HU, iterations=2)))
 
 
 def _widest(

@@ -14,6 +14,7 @@ from scipy import ndimage
 
 from glisson.core.arrays import FloatArray
 from glisson.geometry.distance_map import distance_inside
+from glisson.preoperative.imaging.components import slices_filled
 from glisson.preoperative.liver.intensity_prior import IntensityPrior
 from glisson.preoperative.liver.piece import like_piece
 
@@ -61,10 +62,7 @@ def without_gaps(
     organ: NDArray[np.bool_], smooth: NDArray[np.float32], spacing_mm: FloatArray, radius_mm: float
 ) -> NDArray[np.bool_]:
     """The mask closed by a ball, but for fat and air, and with everything that a slice encloses (vessels)."""
-    whole: NDArray[np.bool_] = organ | (_closed(organ, spacing_mm, radius_mm) & (smooth > 0.0))
-    for k in range(whole.shape[2]):
-        whole[:, :, k] = ndimage.binary_fill_holes(whole[:, :, k])
-    return whole
+    return slices_filled(organ | (_closed(organ, spacing_mm, radius_mm) & (smooth > 0.0)))
 
 
 def _bodies(

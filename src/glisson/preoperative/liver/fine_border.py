@@ -10,6 +10,7 @@ from scipy import ndimage
 
 from glisson.core.image import Volume
 from glisson.geometry.distance_map import distance_inside
+from glisson.preoperative.imaging.components import largest_part, slices_filled
 from glisson.preoperative.imaging.working_grid import WorkingGrid
 from glisson.preoperative.liver.intensity_prior import IntensityPrior
 
@@ -21,9 +22,6 @@ _ABOUT_MM = 3.0
 
 _NOISE_MM, _RIPPLES_MM = 1.0, 0.8
 """Standard deviations of the Gaussians that take the noise out of the grey values, and ripples out of the border."""
-
-_RANGE = 3.0
-"""Grey values are cut to so many half widths of the organ's band: lung would blind the means to fat."""
 
 _MARGIN_MM = 10.0
 _FEW = 0.01
@@ -50,17 +48,16 @@ def fine_border(
     high = [min(side.stop + m, n) for side, m, n in zip(found, margin.tolist(), organ.shape, strict=True)]
     part, place = grid.part(low, high)
     box = tuple(slice(a, b) for a, b in zip(low, high, strict=True))
-    limits = (prior.mean - _RANGE * prior.half_width, prior.mean + _RANGE * prior.half_width)
-    inside, outside = _sides(organ[box], np.clip(smooth[box], *limits), prior, part)
+    inside, outside = _sides(organ[box], np.clip(smooth[box], *prior.visible), prior, part)
     spacing = part.spacing_mm / part.factors
     coarse = np.transpose(part.full(organ[box]), part.order)
     values = np.transpose(volume.voxels[place], part.order).astype(np.float32)
-    values = ndimage.gaussian_filter(np.clip(values, *limits), _NOISE_MM / spacing)
+    values = ndimage.gaussian_filter(np.clip(values, *prior.visible), _NOISE_MM / spacing)
     near = np.maximum(distance_inside(coarse, spacing), distance_inside(~coarse, spacing)) <= _BAND_MM
     fine = np.where(near, np.abs(values - inside) < np.abs(values - outside), coarse)
     fine = ndimage.gaussian_filter(fine.astype(np.float32), _RIPPLES_MM / spacing) >= 0.5
     whole = np.zeros(volume.grid.shape, dtype=bool)
-    whole[place] = np.transpose(_largest(fine), np.argsort(part.order))
+    whole[place] = np.transpose(slices_filled(largest_part(fine)), np.argsort(part.order))
     return whole
 
 
@@ -69,7 +66,7 @@ def _sides(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Mean grey value of the organ, and of what is not, about each of the scan's voxels (row, column, slice)."""
     means = []
-    for side, unknown in ((organ, prior.mean), (~organ, prior.mean - _RANGE * prior.half_width)):
+    for side, unknown in ((organ, prior.mean), (~organ, prior.visible[0])):
         share = ndimage.gaussian_filter(side.astype(np.float32), _ABOUT_MM / part.spacing_mm)
         total = ndimage.gaussian_filter(np.where(side, smooth, np.float32(0.0)), _ABOUT_MM / part.spacing_mm)
         mean = np.where(share > _FEW, total / np.maximum(share, _FEW), np.float32(unknown))
@@ -77,12 +74,3 @@ def _sides(
         a, b, c = part.shape
         means.append(fine[:a, :b, :c])
     return means[0], means[1]
-
-
-def _largest(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The largest part of a mask, with what it encloses in each slice."""
-    parts, _ = ndimage.label(mask)
-    largest: NDArray[np.bool_] = parts == int(np.argmax(np.bincount(parts.ravel())[1:])) + 1
-    for k in range(largest.shape[2]):
-        largest[:, :, k] = ndimage.binary_fill_holes(largest[:, :, k])
-    return largest

@@ -25,6 +25,9 @@ _LOCAL_BAND, _ORGAN_BAND = 5.0, 3.0
 _NARROWEST, _WIDEST = 16.0, 28.0
 """Half of the narrowest and the widest band (HU); a wider one would hold neighbouring organs."""
 
+_VISIBLE = 3.0
+"""What differs from the organ by more half widths than this is cut off there."""
+
 _INSIDE_MM = 5.0
 """What lies so deep in a region is not its border's partial volumes."""
 
@@ -41,6 +44,11 @@ class IntensityPrior:
     def half_width(self) -> float:
         """Half of the band of grey values that the organ's tissue has (HU)."""
         return float(np.clip(self.band * self.deviation, _NARROWEST, _WIDEST))
+
+    @property
+    def visible(self) -> tuple[float, float]:
+        """Least and greatest grey value to look at about the organ: lung and bone would blind means to all between."""
+        return self.mean - _VISIBLE * self.half_width, self.mean + _VISIBLE * self.half_width
 
 
 def estimate_prior(

@@ -13,6 +13,7 @@ from skimage.segmentation import watershed
 
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.geometry.distance_map import distance_inside
+from glisson.preoperative.imaging.components import largest_part
 from glisson.preoperative.liver.intensity_prior import SOFT_TISSUE_HU, IntensityPrior
 
 _NARROWEST_PASSAGE = 0.3
@@ -55,7 +56,7 @@ def reachable_region(
     band = np.abs(smooth - prior.mean) < prior.half_width
     filled = _without_vessel_gaps(band, spacing_mm) & (smooth > SOFT_TISSUE_HU[0])
     distance = distance_inside(filled, spacing_mm)
-    width = ndimage.gaussian_filter(distance.astype(np.float32), 1.5 / spacing_mm) * filled
+    width = ndimage.gaussian_filter(distance, 1.5 / spacing_mm) * filled
     # Flat tops and ripples give more basins than needed; their wide passages join them again below.
     size = np.maximum(np.rint(_LEAST_APART_MM / spacing_mm), 3).astype(int)
     markers, count = ndimage.label((width == ndimage.maximum_filter(width, size=tuple(size))) & (width > 0.0))
@@ -72,10 +73,7 @@ def reachable_region(
 
 def opened(region: NDArray[np.bool_], spacing_mm: FloatArray, radius_mm: float) -> NDArray[np.bool_]:
     """The largest part of a region that a ball of this radius reaches, and a millimetre about it."""
-    cores, count = ndimage.label(distance_inside(region, spacing_mm) > radius_mm)
-    if count == 0:
-        return np.zeros(region.shape, dtype=bool)
-    core = cores == int(np.argmax(np.bincount(cores.ravel())[1:])) + 1
+    core = largest_part(distance_inside(region, spacing_mm) > radius_mm)
     result: NDArray[np.bool_] = region & (distance_inside(~core, spacing_mm) < radius_mm + 1.0)
     return result
 

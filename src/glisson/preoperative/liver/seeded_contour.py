@@ -39,9 +39,6 @@ from glisson.preoperative.liver.reachable import opened, reachable_region
 from glisson.preoperative.liver.settled_prior import settled_prior
 from glisson.preoperative.liver.slice_flags import flag_slices
 
-_CONTOUR_RANGE = 3.0
-"""The contour sees grey values up to so many half widths of the liver's band: lung would blind it to fat."""
-
 _GAP_MM = 4.0
 _NEAR_MM = 5.0
 """A click so near to the region that is found without one says that it is the right one."""
@@ -117,7 +114,7 @@ class SeededContour:
             raise BadInput("There is no soft tissue about the click; click inside the liver.")
         region, prior = found
         _require_volume(region, grid, seeds_mm if start is None or clicked else start.point_mm[None])
-        organ, flags = self._contoured(scene, region, prior, grid, progress)
+        organ, flags = self._contoured(smooth, region, prior, grid, progress)
         on_scan = fine_border(volume, organ, smooth, prior, grid) if volume.modality == "CT" else grid.full(organ)
         full = ndimage.binary_fill_holes(on_scan | known)
         flags += [(border.slice_near(volume.grid), border.sentence) for border in touched_borders(full)]
@@ -126,29 +123,28 @@ class SeededContour:
 
     def _contoured(
         self,
-        scene: "_Scene",
+        smooth: NDArray[np.float32],
         region: NDArray[np.bool_],
         prior: IntensityPrior,
         grid: WorkingGrid,
         progress: Progress,
     ) -> tuple[NDArray[np.bool_], list[tuple[int, str]]]:
         """The contours' mask, cleaned in 3-D, and the slices that look wrong (the scan's numbers)."""
-        chosen, smooth = self._parameters, scene.smooth
+        chosen = self._parameters
         forces = LocalizedContourParameters(
             energy=chosen.energy,
             radius_mm=chosen.radius_mm,
             curvature=chosen.curvature,
             iterations=chosen.iterations,
         )
-        reach = _CONTOUR_RANGE * prior.half_width
-        image = np.clip(smooth, prior.mean - reach, prior.mean + reach)
+        image = np.clip(smooth, *prior.visible)
         mask, contours = propagate(
             image, region, grid.spacing_mm, forces, lambda done, message: progress(0.4 + 0.5 * (done or 0.0), message)
         )
         progress(0.9, "clean-up")
         voxel = float(grid.spacing_mm.max())
         cleaned = opened(without_gaps(mask, smooth, grid.spacing_mm, _GAP_MM), grid.spacing_mm, voxel)
-        flags = flag_slices(contours, cleaned, smooth, prior, grid, scene.thorax)
+        flags = flag_slices(contours, cleaned, smooth, prior, grid, region)
         return cleaned, flags
 
 

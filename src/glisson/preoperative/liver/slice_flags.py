@@ -22,7 +22,6 @@ from glisson.geometry.distance_map import distance_inside
 from glisson.preoperative.imaging.working_grid import WorkingGrid
 from glisson.preoperative.liver.intensity_prior import IntensityPrior
 from glisson.preoperative.liver.propagation import SliceContour
-from glisson.preoperative.liver.reachable import reachable_region
 
 _HELD = 0.3
 """Fraction of a contour at its outer limit above which it wants to leave the organ."""
@@ -76,7 +75,7 @@ def flag_slices(
     smooth: NDArray[np.float32],
     prior: IntensityPrior,
     grid: WorkingGrid,
-    thorax: NDArray[np.bool_] | None = None,
+    region: NDArray[np.bool_] | None = None,
 ) -> list[tuple[int, str]]:
     """Slices (the scan's numbers) with a sentence each.
 
@@ -86,9 +85,9 @@ def flag_slices(
         smooth: smoothed grey values there.
         prior: the organ's grey values.
         grid: the working grid.
-        thorax: as for `suspicious_slices`.
+        region: what is reached from the organ's middle, as for `suspicious_slices`.
     """
-    reasons = suspicious_slices(mask, smooth, prior, grid.spacing_mm, thorax)
+    reasons = suspicious_slices(mask, smooth, prior, grid.spacing_mm, region)
     areas = mask.sum(axis=(0, 1)) * float(np.prod(grid.spacing_mm[:2]))
     for k, contour in contours.items():
         reasons[k] += _contour_reasons(contour, float(areas[k]), float(grid.spacing_mm[:2].mean()))
@@ -105,7 +104,7 @@ def suspicious_slices(
     smooth: NDArray[np.float32],
     prior: IntensityPrior,
     spacing_mm: FloatArray,
-    thorax: NDArray[np.bool_] | None = None,
+    region: NDArray[np.bool_] | None = None,
 ) -> Reasons:
     """What looks wrong in a mask, whatever made it; an empty one is not judged.
 
@@ -114,7 +113,7 @@ def suspicious_slices(
         smooth: smoothed grey values, same shape.
         prior: the organ's grey values.
         spacing_mm: voxel spacing (3,).
-        thorax: where a wide body is the heart (`between_lungs`), if that is known.
+        region: what is reached from the organ's middle (`reachable`), if that is known.
     """
     reasons: Reasons = defaultdict(list)
     slices = np.flatnonzero(mask.any(axis=(0, 1)))
@@ -127,7 +126,7 @@ def suspicious_slices(
     # A gap would make what is above and below look short-lived.
     extra = (mask | gaps) & (_heights(mask | gaps) <= few) & mask
     foreign = _foreign(mask, smooth, prior, spacing_mm).sum(axis=(0, 1)) * pixel_mm2
-    apart = _not_reached(mask, smooth, prior, spacing_mm, thorax)
+    apart = np.zeros_like(mask) if region is None else _not_reached(mask, region, smooth, prior, spacing_mm)
     for k in range(int(slices[0]), int(slices[-1]) + 1):
         here = mask[:, :, k]
         if not here.any():
@@ -194,9 +193,8 @@ def _foreign(
     mask: NDArray[np.bool_], smooth: NDArray[np.float32], prior: IntensityPrior, spacing_mm: FloatArray
 ) -> NDArray[np.bool_]:
     """Parts of a mask that have other grey values than the organ and are not enclosed by it."""
-    reach = 3.0 * prior.half_width
     # Only what is in the mask counts, or its border's partial volumes would.
-    inside = np.where(mask, np.clip(smooth, prior.mean - reach, prior.mean + reach), np.float32(prior.mean))
+    inside = np.where(mask, np.clip(smooth, *prior.visible), np.float32(prior.mean))
     calm = ndimage.gaussian_filter(inside, _CALM_MM / spacing_mm)
     other: NDArray[np.bool_] = mask & (np.abs(calm - prior.mean) > prior.half_width)
     for k in range(mask.shape[2]):
@@ -214,15 +212,12 @@ def _foreign(
 
 def _not_reached(
     mask: NDArray[np.bool_],
+    region: NDArray[np.bool_],
     smooth: NDArray[np.float32],
     prior: IntensityPrior,
     spacing_mm: FloatArray,
-    thorax: NDArray[np.bool_] | None,
 ) -> NDArray[np.bool_]:
-    """What of a mask is as bright as the organ, and yet not reached from its middle."""
-    middle = np.unravel_index(int(np.argmax(distance_inside(mask, spacing_mm))), mask.shape)
-    a, b, c = (int(place) for place in middle)
-    region = reachable_region(smooth, prior, spacing_mm, [(a, b, c)], thorax=thorax)
+    """What of a mask is as bright as the organ, and yet lies outside the region."""
     alike = np.abs(smooth - prior.mean) < prior.half_width
     apart: NDArray[np.bool_] = mask & alike & (distance_inside(~region, spacing_mm) > _BESIDE_MM)
     return apart

@@ -12,6 +12,7 @@ from glisson.core.arrays import FloatArray
 from glisson.core.errors import StageFailed
 from glisson.core.image import Grid
 from glisson.framework.segmentation_scores import segmentation_scores
+from glisson.geometry.distance_map import distance_inside
 from glisson.phantom.appearance import draw_ct, draw_mr
 from glisson.phantom.body import body_solids
 from glisson.phantom.canvas import Canvas, voxel_places
@@ -22,6 +23,7 @@ from glisson.preoperative.imaging.ct import smoothed_ct
 from glisson.preoperative.imaging.working_grid import WorkingGrid
 from glisson.preoperative.liver.between_lungs import between_lungs
 from glisson.preoperative.liver.intensity_prior import IntensityPrior, organ_prior
+from glisson.preoperative.liver.reachable import reachable_region
 from glisson.preoperative.liver.seeded_contour import SeededContour, SeededContourParameters
 from glisson.preoperative.liver.slice_flags import suspicious_slices
 from glisson.studies.point import Outcome, Task
@@ -102,7 +104,10 @@ def _flag_rows(phantom: Phantom, anatomy: Anatomy, found: NDArray[np.bool_]) -> 
     smooth = smoothed_ct(phantom.volume, working)
     mask, truth = (working.working(one) >= 0.5 for one in (found, phantom.organ.mask("liver")))
     prior = organ_prior(smooth, mask, working.spacing_mm, IntensityPrior(float(np.median(smooth[mask])), 0.0))
+    depth = distance_inside(mask, working.spacing_mm)
+    a, b, c = (int(place) for place in np.unravel_index(int(np.argmax(depth)), mask.shape))
     thorax = between_lungs(smooth, working, grid)
+    region = reachable_region(smooth, prior, working.spacing_mm, [(a, b, c)], thorax=thorax)
     sound = _sound_slices(mask, truth, working.spacing_mm)
     around = Surroundings(
         neighbours=[working.working(one) >= 0.5 for one in neighbour_masks(anatomy, grid)],
@@ -113,7 +118,7 @@ def _flag_rows(phantom: Phantom, anatomy: Anatomy, found: NDArray[np.bool_]) -> 
     for count, kind in enumerate(KINDS):
         failure = spoilt(kind, mask, around, np.random.default_rng([phantom.seed, 31, count]))
         if failure is not None:
-            reasons = suspicious_slices(failure.mask, smooth, prior, around.spacing_mm, thorax)
+            reasons = suspicious_slices(failure.mask, smooth, prior, around.spacing_mm, region)
             flagged = {k for k, why in reasons.items() if why}
             rows.append(
                 {
