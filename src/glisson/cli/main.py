@@ -26,6 +26,7 @@ from glisson.framework.interruptions import interruptions_held
 COMMANDS = {
     "demo": "run the whole way on the phantom that ships with Glisson",
     "new": "make a case folder from a scan and label maps; nothing that identifies the patient is copied",
+    "artefacts": "lessen the streaks of metal and gas in a CT, and tell what is lost beside them",
     "segment": "find the liver in the scan, or check and clean a label map that was given",
     "vessels": "find portal and hepatic veins inside the liver, tell them apart, and follow them from their roots",
     "correct": "correct the liver's mask by clicks into what is missing or too much",

@@ -19,6 +19,9 @@ from glisson.io.atomic import atomic_folder
 
 SETTINGS = "case.toml"
 SCAN = "images/ct.nii.gz"
+ARTEFACTS = "images/artefacts.json"
+ARTEFACTS_PICTURE = "images/artefacts.png"
+LOST = "images/lost.nii.gz"
 ORGAN = "labels/organ.nii.gz"
 TUMOURS = "labels/tumours.nii.gz"
 STRUCTURES = "labels/structures.nii.gz"

@@ -17,6 +17,7 @@ from glisson.io.images import read_label_maps, read_volume, write_labels, write_
 from glisson.io.label_groups import group_labels, on_grid_of
 from glisson.io.label_names import canonical_name, is_canonical
 from glisson.io.totalsegmentator import class_names
+from glisson.preoperative.artefacts.metal import metal_warnings
 from glisson.preoperative.imaging.scan_checks import scan_warnings
 
 GROUP_FILES = {"organ": ORGAN, "tumours": TUMOURS, "structures": STRUCTURES}
@@ -71,7 +72,7 @@ def import_case(
         write_images(making, volume, groups)
     names = tuple(name for group in groups.values() for name in group.names.values())
     text = burned_in_text(scan, volume)
-    warnings = (*(() if text is None else (text,)), *scan_warnings(volume))
+    warnings = (*(() if text is None else (text,)), *scan_warnings(volume), *metal_warnings(volume))
     return Imported(open_case(folder), names, left_out, warnings)
 
 

@@ -126,12 +126,15 @@ class Pipeline:
         )
 
     def replace(self, case: Case, name: str, write: Callable[[Path], None]) -> None:
-        """Put a file that a person corrected into a case; the one before stays beside it, named `previous-…`.
+        """Put a file that a person corrected into a case, as `replace_together` does."""
+        self.replace_together(case, {name: write})
+
+    def replace_together(self, case: Case, writers: Mapping[str, Callable[[Path], None]]) -> None:
+        """Put files into a case, all or none; those before stay beside them, named `previous-…`.
 
         Args:
             case: the case.
-            name: the file, relative to the case folder.
-            write: writes it to the path that it is given.
+            writers: by the file, relative to the case folder, what writes it to the path that it is given.
 
         Raises:
             BadInput: the case cannot be written.
@@ -139,16 +142,32 @@ class Pipeline:
         """
         case.check_writable()
         with exclusive(case.folder), _disk_errors_as_sentences(case):
-            work, place = case.path(_WORK), case.path(name)
+            work = case.path(_WORK)
             shutil.rmtree(work, ignore_errors=True)
+            moves: list[tuple[Path, Path]] = []
             try:
-                (work / name).parent.mkdir(parents=True)
-                write(work / name)
-                before = [(place, _previous(place))] if place.exists() else []
-                put_in_place([*before, (work / name, place)], work)
+                for name, write in writers.items():
+                    place = case.path(name)
+                    (work / name).parent.mkdir(parents=True, exist_ok=True)
+                    write(work / name)
+                    moves += [(place, previous(place))] if place.exists() else []
+                    moves.append((work / name, place))
+                put_in_place(moves, work)
                 self._mark(case, case.settings())
             finally:
                 shutil.rmtree(work, ignore_errors=True)
+
+    def restore(self, case: Case, name: str) -> None:
+        """Put the file back that was replaced; what replaced it is gone.
+
+        Raises:
+            BadInput: the case cannot be written.
+            WriteFailed: the disk is failing.
+        """
+        case.check_writable()
+        with exclusive(case.folder), _disk_errors_as_sentences(case):
+            previous(case.path(name)).replace(case.path(name))
+            self._mark(case, case.settings())
 
     def outdated(self, case: Case) -> dict[str, str]:
         """Stages whose results are out of date: name → why, in a few words."""
@@ -222,14 +241,15 @@ def _current(
     if found.state is State.GIVEN:
         there = [case.path(name) for name in stage.outputs if case.has(name)]
         lost = [place for place in there if content_hash(place) not in outputs.values()]
-        moves = [(place, _previous(place)) for place in lost] + moves
+        moves = [(place, previous(place)) for place in lost] + moves
     put_in_place(moves, work)
     shutil.rmtree(work, ignore_errors=True)
     heard.ended(stage.name, seconds)
     return seconds, record
 
 
-def _previous(place: Path) -> Path:
+def previous(place: Path) -> Path:
+    """Where the file that was replaced lies."""
     return place.with_name(f"previous-{place.name}")
 
 
