@@ -2,8 +2,7 @@
 
 The start is found (`automatic_start`), and a click confirms it; one elsewhere is the start itself. What of the start's
 band belongs together with it, by the width of passages and the grey value, is the region that the contours
-start from (`reachable`), completed by surface tumours (`completion`); the grey values settle with it
-(`settled_prior`). The contours run from the largest slice to both ends (`propagation`), and where the scan's voxels are
+start from (`scene`), completed by surface tumours; the grey values settle with it. The contours run from the largest slice to both ends (`propagation`), and where the scan's voxels are
 finer the border is found again in them (`fine_border`).
 """
 
@@ -21,7 +20,6 @@ from glisson.core.parameters import parameter
 from glisson.core.protocols import Progress, Segmentation, silent
 from glisson.core.status import Status
 from glisson.core.units import place_text
-from glisson.geometry.distance_map import distance_inside
 from glisson.preoperative.contours.localized_contour import LocalizedContourParameters
 from glisson.preoperative.imaging.axial import slice_axis
 from glisson.preoperative.imaging.borders import touched_borders
@@ -31,19 +29,14 @@ from glisson.preoperative.imaging.mr import smoothed_mr
 from glisson.preoperative.imaging.working_grid import WorkingGrid
 from glisson.preoperative.liver.automatic_start import Start, find_start
 from glisson.preoperative.liver.between_lungs import between_lungs
-from glisson.preoperative.liver.completion import surface_tumours, without_gaps
+from glisson.preoperative.liver.completion import without_gaps
 from glisson.preoperative.liver.fine_border import fine_border
-from glisson.preoperative.liver.intensity_prior import IntensityPrior, estimate_prior
+from glisson.preoperative.liver.intensity_prior import IntensityPrior
 from glisson.preoperative.liver.propagation import propagate
-from glisson.preoperative.liver.reachable import opened, reachable_region
-from glisson.preoperative.liver.settled_prior import settled_prior
+from glisson.preoperative.liver.reachable import opened
+from glisson.preoperative.liver.scene import GAP_MM, Scene, holds, region_about
 from glisson.preoperative.liver.slice_flags import flag_slices
 
-_GAP_MM = 4.0
-_NEAR_MM = 5.0
-"""A click so near to the region that is found without one says that it is the right one."""
-
-_TUMOUR_ROUNDS = 2
 _SMALLEST_ML = 100.0
 _USUAL_ML = (500.0, 4000.0)
 """Volumes of adults' livers; what is outside is shown to a person."""
@@ -106,10 +99,10 @@ class SeededContour:
         tumours = grid.working(known) >= 0.5
         start = _start(smooth, volume, grid, needed=not clicked)
         thorax = between_lungs(smooth, grid, volume.grid) if volume.modality == "CT" else None
-        scene = _Scene(smooth, grid.spacing_mm, tumours, thorax)
-        found = None if start is None else _region_about(scene, [_place(start, volume.grid, grid)])
-        if clicked and (found is None or not _holds(found[0], clicked, grid)):
-            found = _region_about(scene, clicked)
+        scene = Scene(smooth, grid.spacing_mm, tumours, thorax)
+        found = None if start is None else region_about(scene, [_place(start, volume.grid, grid)])
+        if clicked and (found is None or not holds(found[0], clicked, grid)):
+            found = region_about(scene, clicked)
         if found is None:
             raise BadInput("There is no soft tissue about the click; click inside the liver.")
         region, prior = found
@@ -143,7 +136,7 @@ class SeededContour:
         )
         progress(0.9, "clean-up")
         voxel = float(grid.spacing_mm.max())
-        cleaned = opened(without_gaps(mask, smooth, grid.spacing_mm, _GAP_MM), grid.spacing_mm, voxel)
+        cleaned = opened(without_gaps(mask, smooth, grid.spacing_mm, GAP_MM), grid.spacing_mm, voxel)
         flags = flag_slices(contours, cleaned, smooth, prior, grid, region)
         return cleaned, flags
 
@@ -156,52 +149,6 @@ def _known_tumours(volume: Volume, labels: LabelMap | None) -> NDArray[np.bool_]
     if not volume.grid.matches(labels.grid):
         raise BadInput("The label map of the tumours lies on another grid than the scan; resample it onto the scan's.")
     return labels.mask(*names)
-
-
-@dataclass(frozen=True, eq=False)
-class _Scene:
-    """What a region is found in: smoothed values, voxel spacing, known tumours, and where a wide body is the heart."""
-
-    smooth: NDArray[np.float32]
-    spacing_mm: FloatArray
-    tumours: NDArray[np.bool_]
-    thorax: NDArray[np.bool_] | None
-
-    def reachable(
-        self, tumours: NDArray[np.bool_], prior: IntensityPrior, clicked: list[tuple[int, int, int]]
-    ) -> NDArray[np.bool_]:
-        """The reachable region with tumours, which may hide liver that lies behind them."""
-        healed = np.where(tumours, np.float32(prior.mean), self.smooth)
-        reached = reachable_region(healed, prior, self.spacing_mm, clicked, thorax=self.thorax)
-        return reached | tumours if reached.any() else reached
-
-
-def _region_about(
-    scene: _Scene, clicked: list[tuple[int, int, int]]
-) -> tuple[NDArray[np.bool_], IntensityPrior] | None:
-    """The organ's region about clicks, and its grey values; None where there is no soft tissue."""
-    smooth, spacing_mm = scene.smooth, scene.spacing_mm
-    local = estimate_prior(smooth, spacing_mm, clicked)
-    if local is None:
-        return None
-    prior = settled_prior(smooth, local, spacing_mm, clicked, scene.thorax)
-    tumours = scene.tumours
-    region = scene.reachable(tumours, prior, clicked)
-    for _ in range(_TUMOUR_ROUNDS):
-        found = surface_tumours(region, smooth, prior, spacing_mm)
-        if not found.any():
-            break
-        tumours = tumours | found
-        region = scene.reachable(tumours, prior, clicked)
-    return without_gaps(region, smooth, spacing_mm, _GAP_MM), prior
-
-
-def _holds(region: NDArray[np.bool_], clicked: list[tuple[int, int, int]], grid: WorkingGrid) -> bool:
-    """Whether the region holds the clicks; a tumour or a border that it lacks may lie a little outside."""
-    if not region.any():
-        return False
-    away = distance_inside(~region, grid.spacing_mm)
-    return all(away[index] <= _NEAR_MM for index in clicked)
 
 
 def _smoothed(
