@@ -18,6 +18,7 @@ from skimage.transform import iradon, radon, resize
 from glisson.core.arrays import FloatArray
 from glisson.core.image import Volume
 from glisson.preoperative.imaging.axial import slice_axis
+from glisson.preoperative.imaging.scan_checks import hu_fault
 
 _METAL_HU, _BESIDE_HU = 1600.0, 1000.0
 """No bone of the trunk is as dense as the first; voxels at the border of metal hold some of it."""
@@ -40,8 +41,10 @@ def metal_voxels(hu: NDArray[Any]) -> NDArray[np.bool_]:
 
 
 def metal_warnings(volume: Volume) -> tuple[str, ...]:
-    """A sentence on the metal in a scan; none where there is none, or the scan is no CT."""
-    metal = metal_voxels(volume.voxels) if volume.modality == "CT" else np.zeros((1, 1, 1), dtype=bool)
+    """A sentence on the metal in a scan; none where there is none, or the scan has no HU."""
+    if volume.modality != "CT" or hu_fault(volume) is not None:
+        return ()
+    metal = metal_voxels(volume.voxels)
     if not metal.any():
         return ()
     amount_ml = float(metal.sum()) * volume.grid.voxel_volume_mm3 * 1e-3

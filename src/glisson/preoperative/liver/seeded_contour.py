@@ -1,9 +1,9 @@
 """The liver from a CT and a click or none, or an MR and a click: localized contours from slice to slice.
 
 The start is found (`automatic_start`), and a click confirms it; one elsewhere is the start itself. What of the start's
-band belongs together with it, by the width of passages and the grey value, is the region that the contours
-start from (`scene`), completed by surface tumours; the grey values settle with it. The contours run from the largest slice to both ends (`propagation`), and where the scan's voxels are
-finer the border is found again in them (`fine_border`).
+band belongs together with it, by the width of passages and the grey value, is the region that the contours start from
+(`scene`), completed by surface tumours; the grey values settle with it. The contours run from the largest slice to both
+ends (`propagation`), and where the scan's voxels are finer the border is found again in them (`fine_border`).
 """
 
 from dataclasses import dataclass
