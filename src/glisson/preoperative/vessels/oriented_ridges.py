@@ -53,7 +53,8 @@ def _directions() -> FloatArray:
     """Unit vectors (49, 3) to the voxels up to two steps away, one for each line through them."""
     steps = [step for step in itertools.product(range(-2, 3), repeat=3) if step > (0, 0, 0) and math.gcd(*step) == 1]
     vectors = np.array(steps, dtype=np.float64)
-    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
+    return vectors
 
 
 def _lines(directions: FloatArray, length: float) -> tuple[IntArray, NDArray[np.float32]]:
