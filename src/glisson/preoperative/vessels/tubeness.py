@@ -69,6 +69,7 @@ class Tubeness(TubeSegmenter[TubenessParameters]):
         strength[calm <= chosen.excess] = 0.0
         ridges: NDArray[np.bool_] = apply_hysteresis_threshold(strength, chosen.connected, chosen.sure)
         foreign = _far_too_bright(calm, ridges, within, chosen.excess, size)
+        # A ridge has about a third of its vessel's volume.
         ridges = without_crumbs(ridges & ~foreign, chosen.smallest_mm3 / 3.0, size)
         return _up_to_half(calm, ridges, size) & ~foreign
 
