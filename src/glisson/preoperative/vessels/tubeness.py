@@ -69,9 +69,7 @@ class Tubeness(TubeSegmenter[TubenessParameters]):
         strength[calm <= chosen.excess] = 0.0
         ridges: NDArray[np.bool_] = apply_hysteresis_threshold(strength, chosen.connected, chosen.sure)
         foreign = _far_too_bright(calm, ridges, within, chosen.excess, size)
-        # A ridge has about a third of its vessel's volume.
-        ridges = without_crumbs(ridges & ~foreign, chosen.smallest_mm3 / 3.0, size)
-        return _up_to_half(calm, ridges, size) & ~foreign
+        return _up_to_half(calm, ridges & ~foreign, size) & ~foreign
 
 
 def _excess(values: NDArray[np.float32], organ: NDArray[np.bool_], size_mm: float) -> NDArray[np.float32]:
