@@ -16,7 +16,7 @@ pytestmark = pytest.mark.real
 
 
 def test_veins_better_than_by_the_six_steps(ircad: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    """Aims are a Dice of 0.65 and a clDice of 0.70; nnU-Net, trained, reaches a Dice of 0.761 on such veins."""
+    """The aims, a Dice of 0.65 and a clDice of 0.70; nnU-Net, trained, reaches a Dice of 0.761 on such veins."""
     volume = read_volume(ircad / "PATIENT_DICOM")
     masks = {
         name: np.asarray(read_dicom_mask(ircad / "MASKS_DICOM" / name).voxels) > 0
@@ -31,5 +31,5 @@ def test_veins_better_than_by_the_six_steps(ircad: Path, capfd: pytest.CaptureFi
         with capfd.disabled():
             dice, cldice = scores[technique.name]
             print(f"\n3D-IRCADb-01 case 17, veins by {technique.name}: Dice {dice:.3f}, clDice {cldice:.3f}")
-    assert scores["tubeness"][0] > max(0.56, scores["top-hat"][0])
-    assert scores["tubeness"][1] > max(0.65, scores["top-hat"][1])
+    assert scores["tubeness"][0] > max(0.65, scores["top-hat"][0])
+    assert scores["tubeness"][1] > max(0.73, scores["top-hat"][1])

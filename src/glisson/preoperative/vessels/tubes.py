@@ -49,7 +49,7 @@ class TubeSegmenter(ABC, Generic[P]):
         box = IsotropicBox.around(inside, volume.grid, chosen.resolution_mm)
         within, values = box.mask(inside), box.values(volume.voxels)
         found = self._tubes(values if chosen.tubes == "bright" else -values, within, progress) & within
-        found = _without_crumbs(found, chosen.smallest_mm3, chosen.resolution_mm)
+        found = without_crumbs(found, chosen.smallest_mm3, chosen.resolution_mm)
         return LabelMap((box.back(found) & inside).astype(np.uint8), volume.grid, {1: "vessel"})
 
     @abstractmethod
@@ -57,7 +57,7 @@ class TubeSegmenter(ABC, Generic[P]):
         """Voxels [i, j, k] of bright tubes, from grey values in cubic voxels and the organ's mask there."""
 
 
-def _without_crumbs(mask: NDArray[np.bool_], smallest_mm3: float, size_mm: float) -> NDArray[np.bool_]:
+def without_crumbs(mask: NDArray[np.bool_], smallest_mm3: float, size_mm: float) -> NDArray[np.bool_]:
     """The parts of a mask (touching by corners, too) that are not smaller than this."""
     numbered, _ = ndimage.label(mask, structure=np.ones((3, 3, 3)))
     sizes = np.bincount(numbered.ravel()) * size_mm**3
