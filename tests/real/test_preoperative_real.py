@@ -4,15 +4,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from glisson.core import LabelMap
 from glisson.geometry.distance import closest_points
+from glisson.geometry.normals import vertex_normals
 from glisson.io.dicom import read_dicom_mask
 from glisson.io.images import read_labels, read_volume
+from glisson.io.surfaces import read_surface
 from glisson.preoperative.liver.label_segmenter import LabelSegmenter, LabelSegmenterParameters
 from glisson.preoperative.liver.seeded_contour import SeededContour, SeededContourParameters
 from glisson.preoperative.meshing.mmg import Mmg, MmgParameters
 from glisson.preoperative.meshing.surface import MarchingCubes, MarchingCubesParameters
+from glisson.preoperative.model.ligaments import LIGAMENTS
 from glisson.preoperative.model.model_building import ModelSettings, build_model
 from preoperative_shapes import dice
 
@@ -78,6 +82,28 @@ def test_surface_keeps_within_half_a_voxel_of_the_mask(masks: dict[str, LabelMap
     chosen = np.random.default_rng(0).choice(len(faces), 5000, replace=False)
     distance, _ = closest_points(faces[chosen], surface)
     assert np.percentile(distance, 95) < 0.5 * labels.grid.spacing_mm.max()
+
+
+@pytest.mark.parametrize("patient", ["3D-IRCADb-01 case 17", "SciKit-SurgeryVTK's patient"])
+def test_the_hilum_lies_where_the_portal_vein_enters(
+    patient: str, request: pytest.FixtureRequest, shared_data: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if patient.startswith("3D"):
+        masks = request.getfixturevalue("masks")
+        liver, portal = masks["liver"].mask("liver"), masks["portalvein"].mask("portalvein")
+        surface = MarchingCubes(MarchingCubesParameters()).extract(liver, masks["liver"])
+        beside = ndimage.binary_dilation(liver) & ~liver & portal
+        entrance = masks["liver"].grid.points_from_indices(np.argwhere(beside))
+    else:
+        folder = shared_data / "open" / "sksurgeryvtk-liver-models" / "Liver"
+        surface, vein = (read_surface(folder / f"{name}.vtk") for name in ("liver", "portal_vein"))
+        entrance = vein.vertices[closest_points(vein.vertices, surface)[0] < 1.5]
+    points = surface.vertices
+    chosen = points[LIGAMENTS["hilum"].chosen(points, vertex_normals(points, surface.triangles))]
+    apart = np.linalg.norm(chosen.mean(axis=0) - entrance.mean(axis=0))
+    with capsys.disabled():
+        print(f"\n{patient}: hilum {apart:.0f} mm from the middle of the portal vein's entrance")
+    assert apart < 25.0  # half the length of the porta hepatis, some 5 cm
 
 
 def test_totalsegmentator_labels_and_one_click(shared_data: Path, capsys: pytest.CaptureFixture[str]) -> None:
