@@ -1,18 +1,26 @@
 """Model from the masks of a real CT (3D-IRCADb-01, case 17); labels and one click on TotalSegmentator's CT."""
 
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
+from scipy import ndimage
+from skimage.measure import marching_cubes
 
-from glisson.core import LabelMap
+from glisson.core import LabelMap, TriangleSurface
 from glisson.geometry.distance import closest_points
+from glisson.geometry.normals import vertex_normals
 from glisson.io.dicom import read_dicom_mask
 from glisson.io.images import read_labels, read_volume
+from glisson.io.surfaces import read_surface
 from glisson.preoperative.liver.label_segmenter import LabelSegmenter, LabelSegmenterParameters
 from glisson.preoperative.liver.seeded_contour import SeededContour, SeededContourParameters
+from glisson.preoperative.meshing.mesh_quality import mesh_quality
 from glisson.preoperative.meshing.mmg import Mmg, MmgParameters
 from glisson.preoperative.meshing.surface import MarchingCubes, MarchingCubesParameters
+from glisson.preoperative.model.ligaments import LIGAMENTS
 from glisson.preoperative.model.model_building import ModelSettings, build_model
 from preoperative_shapes import dice
 
@@ -78,6 +86,62 @@ def test_surface_keeps_within_half_a_voxel_of_the_mask(masks: dict[str, LabelMap
     chosen = np.random.default_rng(0).choice(len(faces), 5000, replace=False)
     distance, _ = closest_points(faces[chosen], surface)
     assert np.percentile(distance, 95) < 0.5 * labels.grid.spacing_mm.max()
+
+
+def test_figures_of_the_mesh(masks: dict[str, LabelMap], capsys: pytest.CaptureFixture[str]) -> None:
+    """The mesh's surface keeps to the border halfway between the mask's voxels; in narrow clefts the border is farther
+    from the mesh, which is printed beside it."""
+    labels = masks["liver"]
+    mask, grid = labels.mask("liver"), labels.grid
+    surface = MarchingCubes(MarchingCubesParameters()).extract(mask, labels)
+    start = time.perf_counter()
+    mesh = Mmg(MmgParameters()).mesh(surface)
+    seconds = time.perf_counter() - start
+    indices, triangles, _, _ = marching_cubes(np.pad(mask.astype(np.float32), 1), 0.5)
+    border = TriangleSurface(grid.points_from_indices(indices.astype(np.float64) - 1.0), triangles.astype(np.int64))
+    there, back = (
+        np.percentile(closest_points(sampled(one), other)[0], 95)
+        for one, other in ((mesh.surface(), border), (border, mesh.surface()))
+    )
+    quality = mesh_quality(mesh)
+    volume_error = quality.volume_ml / labels.volume_ml("liver") - 1.0
+    with capsys.disabled():
+        print(
+            f"\nmesh of case 17: volume {100.0 * volume_error:+.2f} %, 95 % of the mesh within {there:.2f} mm of the "
+            f"border and of the border within {back:.2f} mm of the mesh, smallest dihedral "
+            f"{quality.smallest_dihedral_deg:.1f}°, {quality.elements} elements in {seconds:.1f} s"
+        )
+    assert abs(volume_error) < 0.005
+    assert there < 0.5 * grid.spacing_mm.max()
+    assert quality.smallest_dihedral_deg > 5.0
+
+
+def sampled(surface: TriangleSurface) -> np.ndarray:
+    """Points (20000, 3) spread evenly over a surface."""
+    points, _ = trimesh.sample.sample_surface(trimesh.Trimesh(surface.vertices, surface.triangles), 20000, seed=0)
+    return np.asarray(points)
+
+
+@pytest.mark.parametrize("patient", ["3D-IRCADb-01 case 17", "SciKit-SurgeryVTK's patient"])
+def test_the_hilum_lies_where_the_portal_vein_enters(
+    patient: str, request: pytest.FixtureRequest, shared_data: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if patient.startswith("3D"):
+        masks = request.getfixturevalue("masks")
+        liver, portal = masks["liver"].mask("liver"), masks["portalvein"].mask("portalvein")
+        surface = MarchingCubes(MarchingCubesParameters()).extract(liver, masks["liver"])
+        beside = ndimage.binary_dilation(liver) & ~liver & portal
+        entrance = masks["liver"].grid.points_from_indices(np.argwhere(beside))
+    else:
+        folder = shared_data / "open" / "sksurgeryvtk-liver-models" / "Liver"
+        surface, vein = (read_surface(folder / f"{name}.vtk") for name in ("liver", "portal_vein"))
+        entrance = vein.vertices[closest_points(vein.vertices, surface)[0] < 1.5]
+    points = surface.vertices
+    chosen = points[LIGAMENTS["hilum"].chosen(points, vertex_normals(points, surface.triangles))]
+    apart = np.linalg.norm(chosen.mean(axis=0) - entrance.mean(axis=0))
+    with capsys.disabled():
+        print(f"\n{patient}: hilum {apart:.0f} mm from the middle of the portal vein's entrance")
+    assert apart < 25.0  # half the length of the porta hepatis, some 5 cm
 
 
 def test_totalsegmentator_labels_and_one_click(shared_data: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,8 +1,8 @@
-"""Where the liver's ligaments and the vena cava hold it, proposed from its shape.
+"""Where the liver's ligaments, the vena cava and the hilum hold it, proposed from its shape.
 
 Each is a window of the organ's extent and the side that its surface faces there: a first proposal, since ligaments do
 not show in a scan. The windows follow the anatomy as Abdel-Misih and Bloomston describe it (2010, Surg. Clin. N. Am.
-90:643).
+90:643). The hilum (porta hepatis), where the hepatoduodenal ligament enters, is the hollow of the visceral surface.
 """
 
 from collections.abc import Mapping
@@ -11,6 +11,7 @@ from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
 
 from glisson.core.arrays import FloatArray
 
@@ -43,13 +44,41 @@ class Window:
 
 _WIDEST_DEG = 70.0
 
-LIGAMENTS: Mapping[str, Window] = MappingProxyType(
+_HOLLOW_SHARE = 0.5
+
+
+@dataclass(frozen=True)
+class Hollow:
+    """The hollow of the surface in a window, without what lies in another one.
+
+    A point's depth is its distance from the organ's convex hull; the points of at least half the greatest depth in the
+    window are the hollow.
+    """
+
+    window: Window
+    without: Window
+
+    def chosen(self, points_mm: FloatArray, normals: FloatArray) -> NDArray[np.bool_]:
+        """Which surface points (n, 3) with outward unit normals (n, 3) lie in the hollow, (n,)."""
+        inside = self.window.chosen(points_mm, normals) & ~self.without.chosen(points_mm, normals)
+        planes = ConvexHull(points_mm).equations
+        depth = np.zeros(len(points_mm))
+        depth[inside] = -(points_mm[inside] @ planes[:, :3].T + planes[:, 3]).max(axis=1, initial=-np.inf)
+        result: NDArray[np.bool_] = inside & (depth >= _HOLLOW_SHARE * depth.max())
+        return result
+
+
+_VENA_CAVA = Window((0.38, 0.6), (0.45, 0.85), (0.5, 0.95), (0.0, 1.0, 0.0))
+
+LIGAMENTS: Mapping[str, Window | Hollow] = MappingProxyType(
     {
         "coronary": Window((0.05, 0.55), (0.45, 1.0), (0.55, 1.0), (0.0, 1.0, 1.0)),
         "right-triangular": Window((0.0, 0.25), (0.4, 1.0), (0.35, 0.85), (-1.0, 1.0, 0.0)),
         "left-triangular": Window((0.7, 1.0), (0.0, 1.0), (0.5, 1.0), (0.0, 1.0, 1.0)),
         "falciform": Window((0.52, 0.64), (0.0, 0.7), (0.3, 1.0), (0.0, -1.0, 1.0)),
-        "vena-cava": Window((0.38, 0.6), (0.45, 0.85), (0.5, 0.95), (0.0, 1.0, 0.0)),
+        "vena-cava": _VENA_CAVA,
+        # The vena cava's groove begins just above, and is as deep.
+        "hilum": Hollow(Window((0.3, 0.6), (0.35, 1.0), (0.3, 0.6), (0.0, 1.0, -1.0)), _VENA_CAVA),
     }
 )
 """Name of what holds the liver → where."""

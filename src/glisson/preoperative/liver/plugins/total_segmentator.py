@@ -11,17 +11,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from glisson.core.arrays import FloatArray
 from glisson.core.errors import BadInput, StageFailed
-from glisson.core.image import Grid, LabelMap, Volume
+from glisson.core.image import LabelMap, Volume
 from glisson.core.parameters import parameter
 from glisson.core.protocols import Progress, Segmentation, silent
 from glisson.core.status import Status
 from glisson.preoperative.child_process import run_child
 from glisson.preoperative.liver.plugins.cleaned import cleaned_liver
+from glisson.preoperative.liver.plugins.exchange import read_found, write_scan
 
 _PROGRAM = "TotalSegmentator"
 _TASKS = {"CT": "total", "MR": "total_mr"}
@@ -70,7 +68,7 @@ class TotalSegmentator:
             raise BadInput(f"{_PROGRAM} is not installed: pip install {_PROGRAM}, or choose another technique.")
         with tempfile.TemporaryDirectory(prefix="glisson-total-") as name:
             folder = Path(name)
-            _write(folder / "scan.nii.gz", volume)
+            write_scan(folder / "scan.nii.gz", volume)
             options = ["--task", _TASKS[volume.modality], "--roi_subset", "liver", "--device", self._parameters.device]
             if self._parameters.fast:
                 options.append("--fast")
@@ -79,30 +77,8 @@ class TotalSegmentator:
             if code != 0:
                 reason = said[:200] or "it said nothing"
                 raise StageFailed(f"{_PROGRAM} ended with the code {code}: {reason}.", Status.STAGNATED)
-            found = _read(folder / "found" / "liver.nii.gz", volume.grid)
+            path = folder / "found" / "liver.nii.gz"
+            if not path.is_file():
+                raise StageFailed(f"{_PROGRAM} ended without a mask of the liver ({path.name}).", Status.STAGNATED)
+            found = read_found(path, volume.grid, _PROGRAM) > 0
         return cleaned_liver(volume, found, labels, _PROGRAM)
-
-
-def _write(path: Path, volume: Volume) -> None:
-    import SimpleITK as sitk  # slow to load, and `--help` needs this module
-
-    image = sitk.GetImageFromArray(volume.voxels.T)  # SimpleITK counts the slowest axis first, and in LPS as we do
-    image.SetSpacing(volume.grid.spacing_mm.tolist())
-    image.SetOrigin(volume.grid.origin_mm.tolist())
-    image.SetDirection(volume.grid.direction.ravel().tolist())
-    sitk.WriteImage(image, str(path))
-
-
-def _read(path: Path, grid: Grid) -> NDArray[np.bool_]:
-    import SimpleITK as sitk
-
-    if not path.is_file():
-        raise StageFailed(f"{_PROGRAM} ended without a mask of the liver ({path.name}).", Status.STAGNATED)
-    image = sitk.ReadImage(str(path))
-    direction = np.reshape(image.GetDirection(), (3, 3))
-    found = Grid(image.GetSize(), np.array(image.GetSpacing()), np.array(image.GetOrigin()), direction)
-    # NIfTI keeps places with the precision of float32.
-    if not grid.matches(found, tolerance_mm=0.01):
-        raise StageFailed(f"{_PROGRAM} gave a mask on another grid than the scan's.", Status.STAGNATED)
-    mask: NDArray[np.bool_] = sitk.GetArrayFromImage(image).T > 0
-    return mask
