@@ -34,11 +34,11 @@ class ContourStructure(StructureMarker):
     def _refined(self, piece: SoftPiece) -> NDArray[np.bool_]:
         spacing = piece.block.spacing_mm
         size_mm = float((0.75 / np.pi * piece.mask.sum() * np.prod(spacing)) ** (1.0 / 3.0))
-        half = 0.5 * (piece.band.high - piece.band.low)
+        band = piece.band
+        half = min(band.high - band.grey, band.grey - band.low)
         radius = float(np.clip(0.6 * size_mm, *_RADIUS_MM))
         forces = LocalizedContourParameters(radius_mm=radius, contrast=max(half, 1e-3))
         # Grey values far off the band would draw the means of what is outside, and the contour, to them.
-        low, high = piece.band.low - 2.0 * half, piece.band.high + 2.0 * half
-        values = np.clip(piece.block.values, low, high)
+        values = np.clip(piece.block.values, band.grey - 3.0 * half, band.grey + 3.0 * half)
         found: NDArray[np.bool_] = evolve(values, piece.mask, spacing, forces, _FREEDOM_MM).mask & piece.within
         return found if found.any() else piece.mask

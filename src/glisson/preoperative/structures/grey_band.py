@@ -21,6 +21,9 @@ _LEAST_SHARE = 0.02
 
 _FARTHER = 70.0
 
+_FAR = 3.0
+"""Away from the tissue that it stands out from, a band reaches so many times as far: tumours are necrotic in parts."""
+
 _LEAST_NEAR = 0.2
 """Part of what is near to a click that must stand out: near a border it is less than half, by noise a few voxels."""
 
@@ -59,7 +62,8 @@ def band_against(reference: float, near: NDArray[np.float32], clicked: float, no
     start = reference + side * float(np.percentile(side * (others - reference), _FARTHER))
     grey = settled(start, others, max(_APART * noise, 0.25 * abs(start - reference)))
     half = max(0.5 * abs(grey - reference), _LEAST * noise)
-    return GreyBand(grey, grey - half, grey + half)
+    far = _FAR * half
+    return GreyBand(grey, grey - (far if side < 0.0 else half), grey + (far if side > 0.0 else half))
 
 
 def band_among(about: NDArray[np.float32], grey: float, noise: float, most: float) -> GreyBand:
