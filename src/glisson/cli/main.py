@@ -30,6 +30,7 @@ COMMANDS = {
     "segment": "find the liver in the scan, or check and clean a label map that was given",
     "vessels": "find portal and hepatic veins inside the liver, tell them apart, and follow them from their roots",
     "correct": "correct the liver's mask by clicks into what is missing or too much",
+    "structure": "mark a tumour, the gallbladder, a guide wire or a stent by clicks into it",
     "mesh": "build the liver's model: surface, tetrahedra, materials, attachments, structures",
     "simulate": "compute what scenario.toml does to the liver (runs the stages before it where they are out of date)",
     "navigate": "tell where tumours, planes and volumes are now (runs the stages before it where they are out of date)",

@@ -97,6 +97,35 @@ class VesselSegmenter(Technique, Protocol):
         """
 
 
+@dataclass(frozen=True, eq=False)
+class MarkedStructure:
+    """A structure as {1: name}, with sentences on what a person should look at."""
+
+    labels: LabelMap
+    notes: tuple[str, ...] = ()
+
+
+class StructureSegmenter(Technique, Protocol):
+    """Marks one structure that was clicked (entry-point group `glisson.structure_segmenters`)."""
+
+    def mark(
+        self, volume: Volume, organ: LabelMap | None, name: str, seeds_mm: FloatArray, progress: Progress = silent
+    ) -> MarkedStructure:
+        """The structure on the scan's grid.
+
+        Args:
+            volume: the scan.
+            organ: the organ ("liver") on the same grid, where it is known.
+            name: "tumour1", "tumour2", …, "gallbladder", "wire" or "stent".
+            seeds_mm: clicks into it, (n, 3) LPS mm.
+            progress: told how far it is.
+
+        Raises:
+            BadInput: another name, no click, or one that lies where the structure cannot be.
+            StageFailed: nothing was found, or more than the structure.
+        """
+
+
 class SegmentDivider(Technique, Protocol):
     """Divides the liver into Couinaud's segments (entry-point group `glisson.segment_dividers`).
 

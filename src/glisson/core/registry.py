@@ -18,6 +18,7 @@ from glisson.core.protocols import (
     SegmentDivider,
     Segmenter,
     Solver,
+    StructureSegmenter,
     SurfaceExtractor,
     SurfaceReconstructor,
     VesselSegmenter,
@@ -26,6 +27,7 @@ from glisson.core.protocols import (
 KINDS: dict[str, tuple[str, type[Any]]] = {
     "segmenter": ("glisson.segmenters", Segmenter),
     "vessel-segmenter": ("glisson.vessel_segmenters", VesselSegmenter),
+    "structure-segmenter": ("glisson.structure_segmenters", StructureSegmenter),
     "segment-divider": ("glisson.segment_dividers", SegmentDivider),
     "surface-extractor": ("glisson.surface_extractors", SurfaceExtractor),
     "mesher": ("glisson.meshers", Mesher),

@@ -37,14 +37,16 @@ def liver_mask(path: str | Path, grid: Grid, what: str) -> NDArray[np.bool_]:
     Raises:
         BadInput: it cannot be read, has several labels and none is the liver, or lies on another grid.
     """
-    maps = read_label_maps(path)
-    named = next((labels for labels in maps if LIVER in labels.names.values()), None)
-    if named is None and len(maps) == 1 and len(maps[0].names) == 1:
-        named = maps[0]
-    if named is None:
-        raise BadInput(f"{what.capitalize()} {path} has no label {LIVER!r}; give a mask of the liver alone.")
-    named = on_grid_of(grid, named, f"{what} {path}")
-    return named.mask(LIVER if LIVER in named.names.values() else next(iter(named.names.values())))
+    return _named_mask(path, grid, LIVER, what)
+
+
+def structure_reference(path: str | Path, grid: Grid, name: str) -> NDArray[np.bool_]:
+    """A structure [i, j, k] of a label map with that name, or of one with a single label, on a scan's grid.
+
+    Raises:
+        BadInput: it cannot be read, has several labels and none is of that name, or lies on another grid.
+    """
+    return _named_mask(path, grid, name, "the reference")
 
 
 def given_mask_facts(case: Case) -> dict[str, Any]:
@@ -80,3 +82,14 @@ def compare_vessels(case: Case, path: str | Path) -> dict[str, float | None]:
         "centreline_dice": centreline_dice(whole, reference),
         "right_system": right,
     }
+
+
+def _named_mask(path: str | Path, grid: Grid, name: str, what: str) -> NDArray[np.bool_]:
+    maps = read_label_maps(path)
+    named = next((labels for labels in maps if name in labels.names.values()), None)
+    if named is None and len(maps) == 1 and len(maps[0].names) == 1:
+        named = maps[0]
+    if named is None:
+        raise BadInput(f"{what.capitalize()} {path} has no label {name!r}; give a mask of that alone.")
+    named = on_grid_of(grid, named, f"{what} {path}")
+    return named.mask(name if name in named.names.values() else next(iter(named.names.values())))

@@ -1,7 +1,8 @@
 """One name for one structure: the names of other tools are mapped to those that Glisson uses.
 
 Canonical names: "liver", "tumour1", "tumour2" …, "portal", "hepatic", "artery", "duct", "wire",
-"gallbladder", "ivc", and "vessels" where the systems are not told apart. Whatever is unknown keeps its own name.
+"stent", "gallbladder", "ivc", and "vessels" where the systems are not told apart. Whatever is unknown keeps its own
+name.
 """
 
 import re
@@ -27,7 +28,7 @@ _CANONICAL = {
     "biliarytract": "duct",
     "guidewire": "wire",
 }
-_PLAIN = ("liver", "gallbladder", "portal", "hepatic", "artery", "duct", "wire", "ivc", "vessels")
+_PLAIN = ("liver", "gallbladder", "portal", "hepatic", "artery", "duct", "wire", "stent", "ivc", "vessels")
 _TUMOUR = re.compile(r"^(?:liver|hepatic)?(?:tumou?r|lesion|metastas[ie]s)s?0*(\d*)$")
 
 

@@ -1,0 +1,1 @@
+"""Single structures about a click: tumours, gallbladder, guide wire and stent."""
