@@ -18,7 +18,7 @@ pytestmark = pytest.mark.real
 
 
 def test_tumours_from_a_click_into_their_middle(ircad: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    """Nothing was tuned on this scan. The click is the tumour's deepest voxel, as a person would choose it."""
+    """The click is the tumour's deepest voxel. That bands reach farther on one side was tried because of this scan."""
     volume = read_volume(ircad / "PATIENT_DICOM")
     liver = np.asarray(read_dicom_mask(ircad / "MASKS_DICOM" / "liver").voxels) > 0
     organ = LabelMap(liver.astype(np.uint8), volume.grid, {1: "liver"})
@@ -35,3 +35,5 @@ def test_tumours_from_a_click_into_their_middle(ircad: Path, capfd: pytest.Captu
                     f"\n3D-IRCADb-01 case 17, tumour {number} ({volume_ml:.1f} ml) "
                     f"by {technique.name}: Dice {scores.dice:.3f}, distance {scores.asd_mm:.2f} mm {made.notes}"
                 )
+            # The tumours are necrotic in parts and treated, as no phantom's is: a mark to be corrected, but a mark.
+            assert scores.dice > 0.5

@@ -10,7 +10,7 @@ import pytest
 from glisson.core.image import LabelMap
 from glisson.framework.case import STRUCTURES, TUMOURS, Case
 from glisson.io.images import read_labels, write_labels, write_volume
-from small_case import GRID, contents, images, make_small_case, offer_bending
+from small_case import GRID, TUMOUR_MM, contents, images, make_small_case, offer_bending
 
 Glisson = Callable[..., tuple[int, dict[str, Any]]]
 CLICK = "28,3,8"
@@ -84,16 +84,27 @@ def test_a_wire_takes_its_voxels_from_the_duct_alone(case: Case, glisson: Glisso
 
 
 def test_what_another_label_has_is_left_to_it(case: Case, glisson: Glisson) -> None:
+    """The first tumour's label covers half of it, so that the second can have the rest."""
+    grid_x = GRID.points_from_indices(np.stack([np.arange(GRID.shape[0]), *np.zeros((2, GRID.shape[0]))], axis=1))[:, 0]
+    tumour = read_labels(case.path(TUMOURS)).mask("tumour1")
+    half = tumour & (grid_x < TUMOUR_MM[0])[:, None, None]
+    write_labels(case.path(TUMOURS), LabelMap(half.astype(np.uint8), GRID, {1: "tumour1"}))
+    code, said = glisson("structure", case.folder, "tumour2", "--seed-point", CLICK)
+    assert code == 0, said
+    assert any("tumour1" in note for note in said["notes"])
+    labels = read_labels(case.path(TUMOURS))
+    np.testing.assert_array_equal(labels.mask("tumour1"), half)
+    assert (labels.mask("tumour2") & tumour & ~half).sum() > 0.7 * (tumour & ~half).sum()
+
+
+def test_what_another_label_has_whole_is_refused(case: Case, glisson: Glisson) -> None:
+    everything = LabelMap(np.ones(GRID.shape, dtype=np.uint8), GRID, {1: "tumour1"})
+    write_labels(case.path(TUMOURS), everything)
     before = contents(case.folder)
     code, said = glisson("structure", case.folder, "tumour2", "--seed-point", CLICK)
-    if code == 0:  # a rim of the tumour may be more than the label has
-        assert any("tumour1" in note for note in said["notes"])
-        np.testing.assert_array_equal(
-            read_labels(case.path(TUMOURS)).mask("tumour1"), images()[1]["tumours"].mask("tumour1")
-        )
-    else:
-        assert "tumour1 already" in said["message"]
-        assert contents(case.folder) == before
+    assert code == 2
+    assert "tumour1 already" in said["message"]
+    assert contents(case.folder) == before
 
 
 @pytest.mark.parametrize(

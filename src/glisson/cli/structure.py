@@ -24,8 +24,9 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
         help="a click into it, LPS mm; may be repeated, for parts of other grey values or of a torn wire",
     )  # fmt: skip
     parser.add_argument(
-        "--technique", metavar="NAME", help=f"threshold or contour, see glisson techniques; by default {BY_THRESHOLD}"
-    )
+        "--technique", metavar="NAME", default=BY_THRESHOLD,
+        help=f"threshold or contour, see glisson techniques; by default {BY_THRESHOLD}",
+    )  # fmt: skip
     for field in fields(StructureParameters):
         words = str(field.metadata["help"]).rstrip(".")
         flag = f"--{field.name.replace('_', '-')}"
@@ -44,7 +45,7 @@ def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
     if arguments.remove:
         marked = remove_structure(case, arguments.name)
     else:
-        technique = arguments.technique or BY_THRESHOLD
+        technique = arguments.technique
         given = {field.name: getattr(arguments, field.name) for field in fields(StructureParameters)}
         parameters = {name: value for name, value in given.items() if value is not None}
         marked = mark_structure(case, arguments.name, arguments.seed_point or (), technique, parameters, progress)

@@ -13,6 +13,7 @@ from glisson.io.images import read_volume, write_labels, write_volume
 from glisson.io.records import write_json
 from glisson.navigation.figures.streak_views import write_streak_views
 from glisson.preoperative.artefacts.cleaning import CleanedScan, cleaned_scan
+from glisson.preoperative.imaging.axial import slice_axis
 
 
 def clean_case(case: Case, progress: Progress = silent) -> CleanedScan:
@@ -29,13 +30,14 @@ def clean_case(case: Case, progress: Progress = silent) -> CleanedScan:
     before = read_volume(case.path(SCAN))
     cleaned = cleaned_scan(before, progress)
     if cleaned.sentences:
+        axis = slice_axis(before.grid)
         lost = LabelMap(cleaned.lost.astype(np.uint8), before.grid, {1: "lost"})
         PIPELINE.replace_together(
             case,
             {
                 SCAN: lambda path: write_volume(path, cleaned.volume),
                 LOST: lambda path: write_labels(path, lost),
-                ARTEFACTS_PICTURE: lambda path: write_streak_views(path, before, cleaned.volume, cleaned.lost),
+                ARTEFACTS_PICTURE: lambda path: write_streak_views(path, before, cleaned.volume, cleaned.lost, axis),
                 ARTEFACTS: lambda path: write_json(
                     path, {"schema": ARTEFACTS_SCHEMA, "sentences": list(cleaned.sentences)}
                 ),

@@ -23,30 +23,29 @@ def compare_with_reference(case: Case, path: str | Path) -> SegmentationScores:
         BadInput: the mask cannot be read, has several labels and none is the liver, or lies on another grid.
     """
     found = read_labels(case.path(ORGAN))
-    return segmentation_scores(found.mask(LIVER), liver_mask(path, found.grid, "the reference"), found.grid)
+    return segmentation_scores(found.mask(LIVER), named_mask(path, found.grid, LIVER, "the reference"), found.grid)
 
 
-def liver_mask(path: str | Path, grid: Grid, what: str) -> NDArray[np.bool_]:
-    """The liver [i, j, k] of a label map with "liver", or of one with a single label, on a scan's grid.
+def named_mask(path: str | Path, grid: Grid, name: str, what: str) -> NDArray[np.bool_]:
+    """A structure [i, j, k] of a label map with that name, or of one with a single label, on a scan's grid.
 
     Args:
         path: a file, or a DICOM folder.
         grid: the scan's.
-        what: what it is, for the sentence ("the reference").
-
-    Raises:
-        BadInput: it cannot be read, has several labels and none is the liver, or lies on another grid.
-    """
-    return _named_mask(path, grid, LIVER, what)
-
-
-def structure_reference(path: str | Path, grid: Grid, name: str) -> NDArray[np.bool_]:
-    """A structure [i, j, k] of a label map with that name, or of one with a single label, on a scan's grid.
+        name: the structure's.
+        what: what the label map is, for the sentence ("the reference").
 
     Raises:
         BadInput: it cannot be read, has several labels and none is of that name, or lies on another grid.
     """
-    return _named_mask(path, grid, name, "the reference")
+    maps = read_label_maps(path)
+    named = next((labels for labels in maps if name in labels.names.values()), None)
+    if named is None and len(maps) == 1 and len(maps[0].names) == 1:
+        named = maps[0]
+    if named is None:
+        raise BadInput(f"{what.capitalize()} {path} has no label {name!r}; give a mask of that alone.")
+    named = on_grid_of(grid, named, f"{what} {path}")
+    return named.mask(name if name in named.names.values() else next(iter(named.names.values())))
 
 
 def given_mask_facts(case: Case) -> dict[str, Any]:
@@ -82,14 +81,3 @@ def compare_vessels(case: Case, path: str | Path) -> dict[str, float | None]:
         "centreline_dice": centreline_dice(whole, reference),
         "right_system": right,
     }
-
-
-def _named_mask(path: str | Path, grid: Grid, name: str, what: str) -> NDArray[np.bool_]:
-    maps = read_label_maps(path)
-    named = next((labels for labels in maps if name in labels.names.values()), None)
-    if named is None and len(maps) == 1 and len(maps[0].names) == 1:
-        named = maps[0]
-    if named is None:
-        raise BadInput(f"{what.capitalize()} {path} has no label {name!r}; give a mask of that alone.")
-    named = on_grid_of(grid, named, f"{what} {path}")
-    return named.mask(name if name in named.names.values() else next(iter(named.names.values())))

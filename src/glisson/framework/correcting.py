@@ -10,7 +10,7 @@ from glisson.core.errors import BadInput
 from glisson.core.image import LabelMap
 from glisson.core.protocols import Progress, silent
 from glisson.framework.case import ORGAN, SCAN, Case
-from glisson.framework.comparing import liver_mask
+from glisson.framework.comparing import named_mask
 from glisson.framework.stages import PIPELINE
 from glisson.io.images import read_labels, read_volume, write_labels
 from glisson.preoperative.correction.clicked_mask import Click, ClickedMask
@@ -75,7 +75,7 @@ def _drawn_slices(before: LabelMap, drawn: str | Path | None, numbers: Sequence[
     mask = before.mask(LIVER)
     if drawn is None:
         return DrawnSlices(mask, mask, (), before.grid)
-    slices = DrawnSlices(mask, liver_mask(drawn, before.grid, "the drawn mask"), numbers, before.grid)
+    slices = DrawnSlices(mask, named_mask(drawn, before.grid, LIVER, "the drawn mask"), numbers, before.grid)
     if not slices.numbers:
         raise BadInput(f"The drawn mask {drawn} is empty; draw the liver in some of its slices.")
     return slices

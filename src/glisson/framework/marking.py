@@ -13,7 +13,7 @@ from glisson.core.image import Grid, LabelMap
 from glisson.core.protocols import Progress, StructureSegmenter, silent
 from glisson.core.registry import make_technique
 from glisson.framework.case import ORGAN, SCAN, STRUCTURES, TUMOURS, Case
-from glisson.framework.comparing import structure_reference
+from glisson.framework.comparing import named_mask
 from glisson.framework.preoperative_stages import labels_of
 from glisson.framework.segmentation_scores import SegmentationScores, segmentation_scores
 from glisson.framework.stages import PIPELINE
@@ -38,7 +38,7 @@ def mark_structure(
     case: Case,
     name: str,
     clicks_mm: Sequence[tuple[float, float, float]],
-    technique: str | None = None,
+    technique: str = BY_THRESHOLD,
     parameters: Mapping[str, Any] | None = None,
     progress: Progress = silent,
 ) -> Marked:
@@ -51,7 +51,7 @@ def mark_structure(
         case: the case; stages that read the labels are out of date then.
         name: "tumour1", "tumour2", …, "gallbladder", "wire" or "stent".
         clicks_mm: clicks into it (x, y, z), LPS mm.
-        technique: of the kind structure-segmenter; none: by threshold.
+        technique: of the kind structure-segmenter.
         parameters: of the technique.
         progress: told how far it is.
 
@@ -60,15 +60,14 @@ def mark_structure(
         StageFailed: nothing was found, or more than the structure.
         WriteFailed: the disk is full.
     """
-    used = technique or BY_THRESHOLD
-    maker: StructureSegmenter = make_technique("structure-segmenter", used, parameters or {}, "--technique")
+    maker: StructureSegmenter = make_technique("structure-segmenter", technique, parameters or {}, "--technique")
     file = _file_of(name)
     case.check_writable()
     progress(0.0, "reading the scan")
     volume = read_volume(case.path(SCAN))
     before, organ = labels_of(case, file), labels_of(case, ORGAN)
     found = maker.mark(volume, organ, name, np.array(clicks_mm, dtype=np.float64), progress)
-    mask = _checked(found.labels, volume.grid, name, used)
+    mask = _checked(found.labels, volume.grid, name, technique)
     after, taken = _with_label(before, volume.grid, name, mask)
     PIPELINE.replace(case, file, lambda path: write_labels(path, after))
     return Marked(case.path(file), _volume_ml(before, name), after.volume_ml(name), (*found.notes, *taken))
@@ -99,7 +98,7 @@ def compare_structure(case: Case, name: str, reference: str | Path) -> Segmentat
         BadInput: the mask cannot be read, has several labels and none of that name, or lies on another grid.
     """
     found = read_labels(case.path(_file_of(name)))
-    return segmentation_scores(found.mask(name), structure_reference(reference, found.grid, name), found.grid)
+    return segmentation_scores(found.mask(name), named_mask(reference, found.grid, name, "the reference"), found.grid)
 
 
 def _file_of(name: str) -> str:

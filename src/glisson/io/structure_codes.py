@@ -40,4 +40,4 @@ def category_and_type(name: str) -> tuple[StructureCode, StructureCode]:
     if re.fullmatch(r"tumour\d+", name):
         return _ALTERED, _NEOPLASM
     own = StructureCode(re.sub(r"\W+", "-", name)[:16], _OWN_SCHEME, name[:64])
-    return _OBJECT if name == "wire" else _ANATOMY, CODES.get(name, own)
+    return _OBJECT if name in ("wire", "stent") else _ANATOMY, CODES.get(name, own)

@@ -28,6 +28,7 @@ _STRUCTURES = {
     "artery": PURPLE,
     "duct": YELLOW,
     "wire": (1.0, 1.0, 1.0),
+    "stent": (0.75, 0.75, 0.75),
     "gallbladder": (0.55, 0.70, 0.30),
     "ivc": (0.50, 0.62, 0.80),
 }

@@ -12,12 +12,11 @@ _WINDOW_HU = (-110.0, 190.0)
 _WIDTH_PX, _TITLE_PX = 1500, 40
 
 
-def write_streak_views(path: str | Path, before: Volume, after: Volume, lost: NDArray[np.bool_]) -> None:
+def write_streak_views(path: str | Path, before: Volume, after: Volume, lost: NDArray[np.bool_], axis: int) -> None:
     """Write a PNG: the axial slice before, after, and what was taken out; lost voxels [i, j, k] are orange.
 
-    Both scans lie on one grid, whose array axis nearest to the patient's long axis numbers the slices.
+    Both scans lie on one grid, whose array axis `axis` numbers the slices.
     """
-    axis = int(np.argmax(np.abs(before.grid.direction[2])))
     old, new = (np.moveaxis(np.asarray(one.voxels, dtype=np.float32), axis, 2) for one in (before, after))
     k = int(np.argmax(((new - old) ** 2).sum(axis=(0, 1))))
     change = old[:, :, k] - new[:, :, k]

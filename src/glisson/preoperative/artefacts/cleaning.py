@@ -12,7 +12,7 @@ from glisson.core.protocols import Progress, silent
 from glisson.geometry.distance_map import distance_inside
 from glisson.preoperative.artefacts.metal import metal_voxels, without_metal_streaks
 from glisson.preoperative.artefacts.streaks import Streaks, find_streaks, gas_voxels, without_streaks
-from glisson.preoperative.imaging.axial import slice_axis
+from glisson.preoperative.imaging.axial import slice_axis, slices_text
 from glisson.preoperative.imaging.scan_checks import require_hu
 
 _LOST_MM = 5.0
@@ -101,8 +101,8 @@ def _metal_sentences(
     if not metal.any():
         return ()
     return (
-        f"Metal ({metal.sum() * voxel_ml:.2g} ml) in {_slices(metal)} streaks the scan: {change_hu:.0f} HU were taken "
-        f"out within {_NEAR_MM:.0f} mm of it (root mean square), some streaks remain.",
+        f"Metal ({metal.sum() * voxel_ml:.2g} ml) in {slices_text(metal, 2)} streaks the scan: {change_hu:.0f} HU were "
+        f"taken out within {_NEAR_MM:.0f} mm of it (root mean square), some streaks remain.",
         f"Within {_LOST_MM:.0f} mm of metal ({lost.sum() * voxel_ml:.1f} ml) no value can be trusted: a border there "
         "is a guess.",
     )
@@ -111,14 +111,9 @@ def _metal_sentences(
 def _streak_sentences(streaks: Streaks | None, voxel_ml: float) -> tuple[str, ...]:
     if streaks is None:
         return ()
+    volume_ml = streaks.where.sum() * voxel_ml
     return (
-        f"Beside gas or metal, in {_slices(streaks.where)}, {streaks.where.sum() * voxel_ml:.0f} ml of soft tissue "
-        f"were streaked (noise of {streaks.noise_hu:.0f} HU, {streaks.usual_noise_hu:.0f} HU elsewhere), and have been "
-        "smoothed from slice to slice: details thinner than two slices are lost there.",
+        f"Beside gas or metal, in {slices_text(streaks.where, 2)}, {volume_ml:.0f} ml of soft tissue were streaked "
+        f"(noise of {streaks.noise_hu:.0f} HU, {streaks.usual_noise_hu:.0f} HU elsewhere), and have been smoothed from "
+        "slice to slice: details thinner than two slices are lost there.",
     )
-
-
-def _slices(mask: NDArray[np.bool_]) -> str:
-    """The slices of a mask (rows, columns, slices), for people."""
-    numbers = np.flatnonzero(mask.any(axis=(0, 1)))
-    return f"slice {numbers[0]}" if len(numbers) == 1 else f"slices {numbers[0]} to {numbers[-1]}"

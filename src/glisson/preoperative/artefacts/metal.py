@@ -17,7 +17,7 @@ from skimage.transform import iradon, radon, resize
 
 from glisson.core.arrays import FloatArray
 from glisson.core.image import Volume
-from glisson.preoperative.imaging.axial import slice_axis
+from glisson.preoperative.imaging.axial import slice_axis, slices_text
 from glisson.preoperative.imaging.scan_checks import hu_fault
 
 _METAL_HU, _BESIDE_HU = 1600.0, 1000.0
@@ -28,7 +28,7 @@ _SOFT_HU = 30.0
 _PIXEL_MM = 1.0
 """Pixels in which rays are computed."""
 
-_ANGLES = 360
+_ANGLES_DEG = np.linspace(0.0, 180.0, 360, endpoint=False)
 _SMOOTHING_MM = 1.5
 _LEAST_RAY = 1e-3
 """Rays of the prior below this (relative to 1 pixel of water) go through air alone."""
@@ -36,6 +36,8 @@ _LEAST_RAY = 1e-3
 
 def metal_voxels(hu: NDArray[Any]) -> NDArray[np.bool_]:
     """Voxels of a CT (HU) that are metal: implants, clips, wires, stents and instruments."""
+    if float(hu.max()) <= _METAL_HU:  # most scans have none, and all are looked at
+        return np.zeros(hu.shape, dtype=bool)
     found: NDArray[np.bool_] = apply_hysteresis_threshold(hu, _BESIDE_HU, _METAL_HU)
     return found
 
@@ -48,10 +50,9 @@ def metal_warnings(volume: Volume) -> tuple[str, ...]:
     if not metal.any():
         return ()
     amount_ml = float(metal.sum()) * volume.grid.voxel_volume_mm3 * 1e-3
-    numbers = np.flatnonzero(np.moveaxis(metal, slice_axis(volume.grid), 2).any(axis=(0, 1)))
     return (
-        f"There is metal in the scan ({amount_ml:.2g} ml, in slices {numbers[0]} to {numbers[-1]}), and grey values "
-        "about it are wrong: glisson artefacts CASE lessens its streaks, and tells what is lost.",
+        f"There is metal in the scan ({amount_ml:.2g} ml, in {slices_text(metal, slice_axis(volume.grid))}), and grey "
+        "values about it are wrong: glisson artefacts CASE lessens its streaks, and tells what is lost.",
     )
 
 
@@ -82,11 +83,10 @@ def _reduced(hu: NDArray[np.float32], metal: NDArray[np.bool_], spacing_mm: Floa
 
 def _change(hu: FloatArray, metal: NDArray[np.bool_]) -> FloatArray:
     """What is to be added to a slice (HU) for its rays through metal to fit those beside them."""
-    theta = np.linspace(0.0, 180.0, _ANGLES, endpoint=False)
-    rays = radon(_density(hu), theta, circle=False)
-    trace = ndimage.binary_dilation(radon(metal.astype(float), theta, circle=False) > 0.1, np.ones((3, 1)))
+    rays = radon(_density(hu), _ANGLES_DEG, circle=False)
+    trace = ndimage.binary_dilation(radon(metal.astype(float), _ANGLES_DEG, circle=False) > 0.1, np.ones((3, 1)))
     without = hu + _reconstructed(_bridged(rays, trace, np.ones_like(rays)) - rays, hu.shape)
-    prior = radon(_density(_prior(without, metal)), theta, circle=False)
+    prior = radon(_density(_prior(without, metal)), _ANGLES_DEG, circle=False)
     return _reconstructed(_bridged(rays, trace, prior) - rays, hu.shape)
 
 
@@ -117,8 +117,7 @@ def _density(hu: FloatArray) -> FloatArray:
 
 def _reconstructed(rays: FloatArray, shape: tuple[int, ...]) -> FloatArray:
     """A picture (HU) of `shape` from rays about the middle of the square that `radon` put it into."""
-    theta = np.linspace(0.0, 180.0, _ANGLES, endpoint=False)
-    whole = iradon(rays, theta, output_size=rays.shape[0], circle=False)
+    whole = iradon(rays, _ANGLES_DEG, output_size=rays.shape[0], circle=False)
     first = [len(whole) // 2 - n // 2 for n in shape]
     part: FloatArray = whole[first[0] : first[0] + shape[0], first[1] : first[1] + shape[1]]
     return 1000.0 * part

@@ -15,10 +15,11 @@ from scipy import ndimage
 from glisson.core.arrays import FloatArray
 from glisson.geometry.distance_map import distance_inside
 from glisson.preoperative.imaging.components import largest_part, slices_filled
+from glisson.preoperative.imaging.ct import VISIBLE_HU
+from glisson.preoperative.imaging.slope import slope
 
 _AIR_HU = -400.0
 _SOFT_HU = (-150.0, 250.0)
-_SEEN_HU = (-300.0, 400.0)
 _REACH_MM = 60.0
 _AROUND_MM = 8.0
 _BORDER_MM, _EVEN_HU_MM = 3.0, 4.0
@@ -98,16 +99,16 @@ def _local_variance(
     hu: NDArray[np.float32], squared_noise: NDArray[np.float32], spacing_mm: FloatArray
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     """Variance of the noise about each voxel, and where it is known: in soft tissue away from steep borders."""
-    smooth = ndimage.gaussian_filter(np.clip(hu, *_SEEN_HU), _BORDER_MM / spacing_mm, truncate=3.0)
+    smooth = ndimage.gaussian_filter(np.clip(hu, *VISIBLE_HU), _BORDER_MM / spacing_mm, truncate=3.0)
     soft = (smooth > _SOFT_HU[0]) & (smooth < _SOFT_HU[1])
-    slope = _slope(smooth, spacing_mm)
-    even = soft & (slope < _EVEN_HU_MM)
+    steepness = slope(smooth, spacing_mm)
+    even = soft & (steepness < _EVEN_HU_MM)
     even &= np.roll(soft, 1, axis=2) & np.roll(soft, -1, axis=2)
     even[:, :, [0, -1]] = False
     sigma = (*(_AROUND_MM / spacing_mm[:2]), 0.0)
     weight = ndimage.gaussian_filter(even.astype(np.float32), sigma, truncate=2.0)
     squares = ndimage.gaussian_filter(np.where(even, squared_noise, np.float32(0.0)), sigma, truncate=2.0)
-    known = soft & (slope < _STEEP_HU_MM) & (weight > _LEAST_EVEN)
+    known = soft & (steepness < _STEEP_HU_MM) & (weight > _LEAST_EVEN)
     return squares / np.maximum(weight, np.float32(1e-3)), known
 
 
@@ -117,11 +118,3 @@ def _without_shells(mask: NDArray[np.bool_], spacing_mm: FloatArray) -> NDArray[
     cross = ndimage.generate_binary_structure(2, 1)[:, :, None]
     opened: NDArray[np.bool_] = ndimage.binary_opening(mask, cross, iterations=steps)
     return opened
-
-
-def _slope(smooth: NDArray[np.float32], spacing_mm: FloatArray) -> NDArray[np.float32]:
-    """Length of the gradient, HU/mm."""
-    steps = np.gradient(smooth)
-    squares = sum((step / size) ** 2 for step, size in zip(steps, spacing_mm, strict=True))
-    slope: NDArray[np.float32] = np.sqrt(squares).astype(np.float32)
-    return slope

@@ -8,7 +8,7 @@ from glisson.preoperative.imaging.diffusion import smoothed
 from glisson.preoperative.imaging.scan_checks import require_hu
 from glisson.preoperative.imaging.working_grid import WorkingGrid
 
-_VISIBLE_HU = (-300.0, 400.0)
+VISIBLE_HU = (-300.0, 400.0)
 """Air and bone are cut to this range before smoothing."""
 
 
@@ -19,4 +19,4 @@ def smoothed_ct(volume: Volume, grid: WorkingGrid) -> NDArray[np.float32]:
         BadInput: its values are no HU.
     """
     require_hu(volume)
-    return smoothed(grid.working(np.clip(volume.voxels, *_VISIBLE_HU)), grid.spacing_mm)
+    return smoothed(grid.working(np.clip(volume.voxels, *VISIBLE_HU)), grid.spacing_mm)

@@ -8,9 +8,11 @@ from scipy import ndimage
 
 from glisson.core.arrays import FloatArray
 from glisson.core.image import Volume
-from glisson.preoperative.imaging.clicked import checked_clicks
+from glisson.preoperative.imaging.clicked import block_about_click
+from glisson.preoperative.imaging.ct import VISIBLE_HU
 from glisson.preoperative.imaging.diffusion import diffused
-from glisson.preoperative.imaging.surroundings import distance_from, surroundings
+from glisson.preoperative.imaging.slope import slope
+from glisson.preoperative.imaging.surroundings import distance_from
 
 _LEAST_NOISE = 0.02
 """Of a CT in HU / 100 and of an MR as part of its signal: less noise is none that a scanner has."""
@@ -22,9 +24,6 @@ _MOST_STEPS = 40
 _CALM_MM = 3.0
 _NOISE_MM = 20.0
 _EVEN_PERCENT = 25.0
-
-_VISIBLE_HU = (-300.0, 400.0)
-"""Air and metal are cut to this range, or they would weigh more than the tissue beside them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,12 +54,10 @@ def block_about(volume: Volume, point_mm: FloatArray, reach_mm: float) -> Block:
         BadInput: the click lies outside the scan.
     """
     spacing = volume.grid.spacing_mm
-    index = np.rint(checked_clicks(volume.grid, point_mm[None])[0]).astype(int)
-    a, b, c = np.clip(index, 0, np.array(volume.grid.shape) - 1).tolist()
-    place, centre = surroundings(volume.grid.shape, spacing, (a, b, c), reach_mm)
+    place, centre = block_about_click(volume.grid, point_mm, reach_mm)
     raw = volume.voxels[place].astype(np.float32)
     if volume.modality == "CT":
-        raw = np.clip(raw, *_VISIBLE_HU)
+        raw = np.clip(raw, *VISIBLE_HU)
     distance = distance_from(centre, raw.shape, spacing)
     about = distance <= _NOISE_MM
     least = _LEAST_NOISE * (100.0 if volume.modality == "CT" else float(np.median(np.abs(raw[about]))) + 1e-6)
@@ -72,6 +69,6 @@ def block_about(volume: Volume, point_mm: FloatArray, reach_mm: float) -> Block:
 def _noise(values: NDArray[np.float32], about: NDArray[np.bool_], spacing_mm: FloatArray) -> float:
     """Standard deviation from what is about each voxel, where that is even: borders of tissues are no noise."""
     calm = ndimage.gaussian_filter(values, _CALM_MM / spacing_mm)
-    slope = np.sqrt(sum(np.square(part / step) for part, step in zip(np.gradient(calm), spacing_mm, strict=True)))
-    even = about & (slope <= np.percentile(slope[about], _EVEN_PERCENT))
+    steepness = slope(calm, spacing_mm)
+    even = about & (steepness <= np.percentile(steepness[about], _EVEN_PERCENT))
     return 1.4826 * float(np.median(np.abs(values - calm)[even]))

@@ -14,11 +14,11 @@ from glisson.core.image import Volume
 from glisson.core.status import Status
 from glisson.core.units import place_text
 from glisson.geometry.distance_map import distance_inside
-from glisson.preoperative.imaging.clicked import checked_clicks
-from glisson.preoperative.imaging.surroundings import distance_from, surroundings
+from glisson.preoperative.imaging.clicked import block_about_click
+from glisson.preoperative.imaging.surroundings import distance_from
 from glisson.preoperative.structures.kinds import Kind
 
-METAL_HU = 800.0
+_METAL_HU = 800.0
 """Brighter than this is metal; bone's outer layer reaches it only where it is thickest."""
 
 _LEAST_HU = 120.0
@@ -46,9 +46,7 @@ def metal_about(
     if volume.modality != "CT":
         raise BadInput(f"A {kind.noun} gives no signal of its own in an MR, so it cannot be followed; use a CT.")
     spacing = volume.grid.spacing_mm
-    index = np.rint(checked_clicks(volume.grid, point_mm[None])[0]).astype(int)
-    a, b, c = np.clip(index, 0, np.array(volume.grid.shape) - 1).tolist()
-    place, centre = surroundings(volume.grid.shape, spacing, (a, b, c), reach_mm)
+    place, centre = block_about_click(volume.grid, point_mm, reach_mm)
     values = np.clip(volume.voxels[place], *_VISIBLE_HU).astype(np.float32)
     distance = distance_from(centre, values.shape, spacing)
     size = tuple(int(n) for n in np.maximum(2 * np.rint(_THIN_MM / spacing) + 1, 3))
@@ -64,7 +62,7 @@ def metal_about(
     noise = hat[distance <= _NOISE_MM]
     usual = float(np.median(noise))
     floor = usual + _OF_NOISE * 1.4826 * float(np.median(np.abs(noise - usual)))
-    bright = (hat >= min(max(_PART * brightest, floor), brightest)) | (values >= METAL_HU)
+    bright = (hat >= min(max(_PART * brightest, floor), brightest)) | (values >= _METAL_HU)
     return place, _linked(bright, at_click, spacing, gap_mm)
 
 

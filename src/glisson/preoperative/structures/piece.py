@@ -16,8 +16,7 @@ def piece_about(
     Opening by a ball, and the part of it that was clicked; where that is thinner itself, with a ball half as large, and
     so on. Holes are filled. Empty where no voxel of `near` is in the mask.
     """
-    numbered, _ = ndimage.label(mask)
-    whole = np.isin(numbered, np.unique(numbered[near & mask])) & mask
+    whole = _touched(mask, near)
     if not whole.any():
         return whole
     depth = distance_inside(whole, spacing_mm)
@@ -33,8 +32,7 @@ def piece_about(
 
 def _touched(mask: NDArray[np.bool_], near: NDArray[np.bool_]) -> NDArray[np.bool_]:
     numbered, _ = ndimage.label(mask)
-    chosen = np.unique(numbered[near & mask])
-    return np.isin(numbered, chosen) & mask
+    return np.isin(numbered, np.unique(numbered[near & mask]))
 
 
 def _filled(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
