@@ -40,6 +40,9 @@ _ROUNDNESS_MM = 6.0
 _COARSE_BANDS = 2.0
 """Spacing, in bands, of the points at which distances are found first."""
 
+_LEFT_LONGER = 1.2
+"""Mmg splits an edge only where it is √2 times as long as asked: in a zone the median comes to so many times that."""
+
 _GOOD_VOLUME_ERROR = 0.001
 _ROUNDS = 4
 
@@ -121,7 +124,7 @@ class Mmg:
                 nodes=mesh.nodes,
                 tetrahedra=mesh.tetrahedra,
                 sizes_mm=_sizes(mesh.nodes, self._parameters.edge_length_mm, finer),
-                shortest_mm=0.5 * min([self._spacing_mm, *(zone.edge_length_mm for zone in finer)]),
+                shortest_mm=0.5 * min([self._spacing_mm, *map(_asked_mm, finer)]),
                 envelope_mm=self._parameters.envelope_mm,
             )
             self._run(source, target, progress)
@@ -181,8 +184,13 @@ def _sizes(nodes: FloatArray, longest_mm: float, finer: Sequence[FineZone]) -> F
     sizes = np.full(len(nodes), longest_mm)
     for zone in finer:
         distance, _ = cKDTree(zone.points_mm).query(nodes)
-        sizes[distance <= zone.reach_mm] = np.minimum(sizes[distance <= zone.reach_mm], zone.edge_length_mm)
+        sizes[distance <= zone.reach_mm] = np.minimum(sizes[distance <= zone.reach_mm], _asked_mm(zone))
     return sizes
+
+
+def _asked_mm(zone: FineZone) -> float:
+    """What Mmg is asked for, so that edges come to the zone's length."""
+    return zone.edge_length_mm / _LEFT_LONGER
 
 
 def _largest_part(nodes: FloatArray, tetrahedra: IntArray) -> TetMesh:
