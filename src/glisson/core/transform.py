@@ -16,7 +16,8 @@ FRAMES = ("camera", "trocar", "room", "patient")
 class RigidTransform:
     """x_target = rotation @ x_source + translation (mm).
 
-    `covariance` is (6, 6) over a rotation vector in the target frame (rad) and the translation (mm).
+    `covariance` is (6, 6) over d (a rotation vector in the target frame, rad) and e (mm) in
+    exp([d]×) rotation and translation + e.
     """
 
     target: str
@@ -38,3 +39,57 @@ class RigidTransform:
         """Points (n, 3) or (3,) of the source frame, in the target frame."""
         result: FloatArray = np.asarray(points_mm, dtype=np.float64) @ self.rotation.T + self.translation_mm
         return result
+
+    def inverse(self) -> "RigidTransform":
+        """`source_from_target`, with its covariance to first order."""
+        back = self.rotation.T
+        covariance = None
+        if self.covariance is not None:
+            jacobian = np.block([[-back, np.zeros((3, 3))], [-back @ cross_matrix(self.translation_mm), -back]])
+            covariance = jacobian @ self.covariance @ jacobian.T
+        return RigidTransform(self.source, self.target, back, -back @ self.translation_mm, covariance)
+
+    def after(self, first: "RigidTransform") -> "RigidTransform":
+        """`first`, then this: `a_from_b.after(b_from_c)` is a_from_c, the errors of both taken as independent.
+
+        A transform without covariance is taken as exact, unless neither has one.
+
+        Raises:
+            BadInput: `first` does not end in the frame in which this begins.
+        """
+        if first.target != self.source:
+            raise BadInput(f"A transform from {self.source!r} cannot follow one to {first.target!r}.")
+        rotation = self.rotation @ first.rotation
+        turned = self.rotation @ first.translation_mm
+        covariance = None
+        if self.covariance is not None or first.covariance is not None:
+            covariance = np.zeros((6, 6))
+            if self.covariance is not None:
+                own = np.block([[np.eye(3), np.zeros((3, 3))], [-cross_matrix(turned), np.eye(3)]])
+                covariance += own @ self.covariance @ own.T
+            if first.covariance is not None:
+                both = np.kron(np.eye(2), self.rotation)
+                covariance += both @ first.covariance @ both.T
+        return RigidTransform(self.target, first.source, rotation, turned + self.translation_mm, covariance)
+
+    def point_covariance(self, point_mm: ArrayLike, covariance_mm2: ArrayLike | None = None) -> FloatArray:
+        """Covariance (3, 3) in mm² of a point (3,) of the source frame in the target frame.
+
+        Args:
+            point_mm: the point.
+            covariance_mm2: its own (3, 3) in the source frame; None: it is exact.
+        """
+        total = np.zeros((3, 3))
+        if covariance_mm2 is not None:
+            total += self.rotation @ np.asarray(covariance_mm2, dtype=np.float64) @ self.rotation.T
+        if self.covariance is not None:
+            turned = self.rotation @ np.asarray(point_mm, dtype=np.float64)
+            jacobian = np.hstack([-cross_matrix(turned), np.eye(3)])
+            total += jacobian @ self.covariance @ jacobian.T
+        return total
+
+
+def cross_matrix(vector: ArrayLike) -> FloatArray:
+    """The matrix (3, 3) whose product with w is the cross product of a vector (3,) with w."""
+    x, y, z = np.asarray(vector, dtype=np.float64)
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

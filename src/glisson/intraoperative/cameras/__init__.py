@@ -1,0 +1,1 @@
+"""Calibrated cameras: projection, and what calibrates them."""
