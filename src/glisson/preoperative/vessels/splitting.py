@@ -1,9 +1,10 @@
-"""Vessel systems told apart by growing each from its root, the surest step first.
+"""Vessel systems told apart by growing each from its root along the cheapest ways.
 
 Portal and hepatic veins touch where they cross, so a mask of both is one piece with false branchings. Each piece of
-its skeleton is to have one vessel that it comes from. All systems grow at the same time from their roots; of all
-steps from what is grown to what is not the cheapest is taken, as Prim's algorithm makes a minimum spanning forest.
-A wrong step at a crossing thus waits until the right vessel has come from the other side. A step costs
+its skeleton is to have one vessel that it comes from. All systems grow at the same time from their roots; of all ways
+from a root to what is not grown yet the cheapest is taken, as Dijkstra's algorithm does (1959). A wrong step at a
+crossing thus waits until the right vessel has come from the other side, and what grows backwards along the other
+system pays for each step. A step costs
 
 - the turn, (1 - cos angle) / 2, less the least turn into the same piece at the same site: a branch has no better stem
   than its own, but a vessel that crosses has itself on the other side;
@@ -31,9 +32,6 @@ _TURN = 0.2
 _WIDENING = 2.0
 _ROOT_MM = 25.0
 """Ends within this distance of a root may come from it: hepatic veins meet outside the liver."""
-
-_FIRST = -1.0
-"""Cost of the piece at a root, less than any other."""
 
 ROOT = -1
 ANYWHERE = -1
@@ -72,6 +70,7 @@ class _Growth:
         self._waiting: list[tuple[float, int, int, _Step]] = []
         self._offered = 0
         self._fed: dict[tuple[int, int], float] = defaultdict(float)
+        self._total: dict[int, float] = {ROOT: 0.0}
         self.taken: dict[int, _Step] = {}
         self.system: dict[int, int] = {}
 
@@ -82,7 +81,7 @@ class _Growth:
             heappush(self._waiting, (self._cost(step), self._offered, system, step))
 
     def grow(self) -> None:
-        """Take the cheapest step until none is left."""
+        """Take the cheapest way until none is left."""
         while self._waiting:
             cost, _, system, step = heappop(self._waiting)
             if step.child in self.taken:
@@ -90,6 +89,7 @@ class _Growth:
             if self._cost(step) > cost + 1e-9:
                 self.offer(system, step)  # a sister has come meanwhile
                 continue
+            self._total[step.child] = cost
             self._take(step)
             self.system[step.child] = system
             for following in self._from[step.child]:
@@ -109,11 +109,12 @@ class _Growth:
         return step.exit == ANYWHERE or before.parent == ROOT or step.exit != before.start
 
     def _cost(self, step: _Step) -> float:
+        so_far = self._total[step.parent] + step.cost
         if step.parent == ROOT:
-            return step.cost
+            return so_far
         stem = self._pieces[step.parent].radius_mm ** 3
         wanted = self._fed[step.parent, step.exit] + self._pieces[step.child].radius_mm ** 3
-        return step.cost + _WIDENING * max(float(np.log(wanted / stem)) / 3.0, 0.0)
+        return so_far + _WIDENING * max(float(np.log(wanted / stem)) / 3.0, 0.0)
 
     def _children(self) -> dict[int, list[int]]:
         children: dict[int, list[int]] = defaultdict(list)
@@ -141,7 +142,7 @@ def split_pieces(pieces: Sequence[Piece], seeds_mm: Sequence[FloatArray]) -> dic
     for system, seeds in enumerate(seeds_mm):
         for seed in seeds:
             number = _piece_at(pieces, seed)
-            growth.offer(system, _Step(ROOT, number, ANYWHERE, _nearer_end(pieces[number], seed), _FIRST))
+            growth.offer(system, _Step(ROOT, number, ANYWHERE, _nearer_end(pieces[number], seed), 0.0))
             for step in _steps_from_root(pieces, seed):
                 growth.offer(system, step)
     growth.grow()
