@@ -24,7 +24,7 @@ def find_board(image: NDArray[np.uint8], board: Board, name: str) -> BoardView |
     Raises:
         BadInput: the image is mirrored, or there is no such ArUco dictionary.
     """
-    grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
+    grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
     if board.kind == "charuco":
         return _charuco(grey, board, name)
     pixels = _corners(grey, board) if board.kind == "chessboard" else _dots(grey, board)
@@ -99,5 +99,5 @@ def _charuco_view(grey: NDArray[np.uint8], board: Board, name: str) -> BoardView
             continue
         points = board.points_mm[ids.ravel()]
         if np.linalg.matrix_rank(points[:, :2] - points[:, :2].mean(axis=0)) == 2:
-            best = BoardView(name, points, corners.reshape(-1, 2))
+            best = BoardView(name, points, np.asarray(corners.reshape(-1, 2), dtype=np.float64))
     return best

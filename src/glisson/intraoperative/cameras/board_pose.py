@@ -74,7 +74,7 @@ def board_poses(camera: Camera, points_mm: FloatArray, pixels: FloatArray) -> li
     )
     poses = []
     for turn, shift in zip(turns, shifts, strict=True):
-        rotation = cv2.Rodrigues(turn)[0]
+        rotation = np.asarray(cv2.Rodrigues(turn)[0], dtype=np.float64)
         poses.append(RigidTransform("camera", "board", rotation, shift.ravel() - rotation @ middle))
     return poses
 

@@ -99,7 +99,7 @@ def _start(seen: Sequence[Seen], width: int, height: int) -> Bundle:
     if not np.isfinite(focal):
         focal = float(width)
     focal = float(np.clip(focal, *np.multiply(_FOCAL_LENGTHS, width)))
-    camera = Camera(width, height, np.full(2, focal), [(width - 1) / 2.0, (height - 1) / 2.0])
+    camera = Camera(width, height, np.full(2, focal), np.array([width - 1, height - 1]) / 2.0)
     return Bundle(camera, tuple(board_poses(camera, one.points_mm, one.pixels)[0] for one in seen), ())
 
 
