@@ -108,7 +108,7 @@ def _weighted(
     rotations: FloatArray, jacobian: FloatArray, shifts: FloatArray
 ) -> tuple[FloatArray, FloatArray, float, float]:
     """Tip and pivot (6,), their covariance, and the tracker's standard deviations in rad and mm."""
-    found: FloatArray = np.linalg.lstsq(jacobian.reshape(-1, 6), -shifts.ravel(), rcond=None)[0]
+    found = np.asarray(np.linalg.lstsq(jacobian.reshape(-1, 6), -shifts.ravel(), rcond=None)[0], dtype=np.float64)
     sizes = np.array([1e-3, 1.0])
     for _ in range(3):
         arms = np.stack([cross_matrix(rotation @ found[:3]) for rotation in rotations])

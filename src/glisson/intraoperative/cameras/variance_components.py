@@ -28,8 +28,7 @@ class Blocks:
 
     def weights(self, sizes: FloatArray) -> FloatArray:
         """The inverse covariance (n, m, m) of each block for sizes (k,)."""
-        result: FloatArray = np.linalg.inv(self._covariance(sizes))
-        return result
+        return np.asarray(np.linalg.inv(self._covariance(sizes)), dtype=np.float64)
 
     def solved(self, sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The unknowns x (p,) with the least weighted squares, and the normal matrix (p, p)."""
