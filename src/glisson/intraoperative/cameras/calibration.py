@@ -115,7 +115,8 @@ def _best_bundle(start: Bundle, seen: Sequence[Seen]) -> _Adjusted:
     count = 2 * sum(len(view.pixels) for view in seen)
     best: _Adjusted | None = None
     least = np.inf
-    state = Bundle(start.camera, start.poses, ())
+    given = start.camera
+    state = Bundle(Camera(given.width, given.height, given.focal_px, given.centre_px), start.poses, ())
     for terms in DISTORTIONS:
         found = adjusted_bundle(Bundle(state.camera, state.poses, terms), seen)
         state = found.state
