@@ -61,10 +61,9 @@ GLOVES = ((0.80, 0.80, 0.76), (0.42, 0.62, 0.78), (0.30, 0.52, 0.45), (0.62, 0.5
 
 def demo_trocar(width: int = 960, height: int = 720) -> Trocar:
     """A trocar with a wide-angle camera of 71° across."""
-    camera = Camera(
-        width, height, [0.7 * width, 0.7 * width], [0.505 * width, 0.49 * height], [-0.22, 0.06, 1e-3, -5e-4, 0.0]
-    )
-    return Trocar(camera, [_CHANNEL_BESIDE_MM, 0.0, -_PIVOT_BELOW_MM], [0.0, 0.0, 1.0])
+    focal, middle = np.full(2, 0.7 * width), np.array([0.505 * width, 0.49 * height])
+    camera = Camera(width, height, focal, middle, np.array([-0.22, 0.06, 1e-3, -5e-4, 0.0]))
+    return Trocar(camera, np.array([_CHANNEL_BESIDE_MM, 0.0, -_PIVOT_BELOW_MM]), np.array([0.0, 0.0, 1.0]))
 
 
 def draw_scene(

@@ -56,12 +56,12 @@ def _box(camera: Camera, scene: WheelScene) -> tuple[slice, slice]:
 
 def _between(slopes: FloatArray, rows: slice, columns: slice) -> FloatArray:
     """Slopes of `_SAMPLES` rays a side for each pixel; within one pixel they change evenly to 1e-7."""
-    by_row, by_column = np.gradient(slopes, axis=(0, 1))
+    by_row, by_column = (np.asarray(np.gradient(slopes, axis=axis)) for axis in (0, 1))
     steps = (np.arange(_SAMPLES) + 0.5) / _SAMPLES - 0.5
     piece = slopes[rows, columns][:, None, :, None, :]
     down = by_row[rows, columns][:, None, :, None, :] * steps[:, None, None, None]
     across = by_column[rows, columns][:, None, :, None, :] * steps[:, None]
-    fine = piece + down + across
+    fine: FloatArray = piece + down + across
     height, _, width, _, _ = fine.shape
     return fine.reshape(height * _SAMPLES, width * _SAMPLES, 2)
 
@@ -136,7 +136,7 @@ def _behind(camera: Camera, rng: np.random.Generator) -> FloatArray:
     size = np.array([camera.height, camera.width])
     rough = np.clip(0.45 + 0.25 * rng.standard_normal((6, 8, 1)) + 0.08 * rng.standard_normal((6, 8, 3)), 0.0, 1.0)
     light: FloatArray = zoom(rough, (size[0] / 6.0, size[1] / 8.0, 1.0), order=1)
-    rows, columns = np.indices(size)
+    rows, columns = np.ogrid[: camera.height, : camera.width]
     for _ in range(int(rng.integers(2, 6))):
         away = np.hypot(rows - rng.uniform(0, size[0]), columns - rng.uniform(0, size[1]))
         light[away < rng.uniform(0.03, 0.09) * size[1]] = rng.uniform(0.9, 1.2)

@@ -18,7 +18,7 @@ Reading = Sequence[str | None]
 
 @dataclass(frozen=True)
 class Alike:
-    """Two instruments (or one and its mirror image) whose codes differ in `sectors` only, too few to tell them apart."""
+    """Two instruments (or one and its mirror image) whose codes differ in too few sectors."""
 
     one: str
     other: str

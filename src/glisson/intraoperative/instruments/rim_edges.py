@@ -46,7 +46,8 @@ class RimEdges:
 
 def white_paper(image: NDArray[np.uint8]) -> NDArray[np.float32]:
     """The darkest channel (h, w) of an image: bright where the paper is white, dark under any ink."""
-    return image.min(axis=2).astype(np.float32)
+    darkest: NDArray[np.float32] = image.min(axis=2).astype(np.float32)
+    return darkest
 
 
 def rim_edges(

@@ -1,6 +1,6 @@
 """Finds a wheel in an image: an ellipse of white paper between black and ink."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -101,7 +101,7 @@ def _ellipse_of(outline: FloatArray, rng: np.random.Generator) -> tuple[FloatArr
 
 
 def _near(
-    points: NDArray[np.float32], ellipse: tuple[tuple[float, float], tuple[float, float], float]
+    points: NDArray[np.float32], ellipse: tuple[Sequence[float], Sequence[float], float]
 ) -> NDArray[np.bool_] | None:
     """Which points (n,) lie on an ellipse; None where it cannot be a wheel's."""
     middle, sizes, turn = np.array(ellipse[0]), 0.5 * np.array(ellipse[1]), np.radians(ellipse[2])

@@ -74,11 +74,11 @@ def fitted_pose(
         if edges.share < LEAST_SHARE:
             raise StageFailed("Too little of the wheel's rims can be seen.", Status.UNOBSERVABLE)
         system = _System.of(camera, pose, radius_mm, edges, trocar)
-        change = np.linalg.solve(system.information, system.pull)
+        change: FloatArray = np.linalg.solve(system.information, system.pull)
         pose = moved(pose, change)
         if step >= len(_WINDOWS) and np.abs(change).max() < 1e-5:
             break
-    inverse = np.linalg.inv(system.information)
+    inverse: FloatArray = np.linalg.inv(system.information)
     covariance = inverse
     if camera.covariance is not None:
         by_camera = inverse @ system.by_camera
@@ -88,7 +88,7 @@ def fitted_pose(
 
 
 def past_pivot(pose: RigidTransform, trocar: Trocar) -> tuple[FloatArray, FloatArray]:
-    """How far (2,) an instrument's axis passes the pivot by, along its x and y, and the derivative (2, 6) by d and e."""
+    """How far (2,) an axis passes the pivot by, along its x and y, and the derivative (2, 6) by d and e."""
     x, y = pose.rotation[:, 0], pose.rotation[:, 1]
     away = trocar.pivot_mm - pose.translation_mm
     off = np.array([x @ away, y @ away])
