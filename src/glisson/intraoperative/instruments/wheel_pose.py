@@ -74,11 +74,11 @@ def fitted_pose(
         if edges.share < LEAST_SHARE:
             raise StageFailed("Too little of the wheel's rims can be seen.", Status.UNOBSERVABLE)
         system = _System.of(camera, pose, radius_mm, edges, trocar)
-        change: FloatArray = np.linalg.solve(system.information, system.pull)
+        change = np.asarray(np.linalg.solve(system.information, system.pull), dtype=np.float64)
         pose = moved(pose, change)
         if step >= len(_WINDOWS) and np.abs(change).max() < 1e-5:
             break
-    inverse: FloatArray = np.linalg.inv(system.information)
+    inverse = np.asarray(np.linalg.inv(system.information), dtype=np.float64)
     covariance = inverse
     if camera.covariance is not None:
         by_camera = inverse @ system.by_camera

@@ -61,7 +61,8 @@ def plane_of(track: TipTrack, towards: FloatArray) -> DrawnPlane:
     rows, off, variances, _ = _equations(track, plane)
     free = len(track) - 3
     misfit = float((off**2 / variances).sum()) / free if free else 0.0
-    covariance: FloatArray = np.linalg.inv((rows / variances[:, None]).T @ rows) * max(misfit, 1.0)
+    information = (rows / variances[:, None]).T @ rows
+    covariance = np.asarray(np.linalg.inv(information) * max(misfit, 1.0), dtype=np.float64)
     return DrawnPlane(plane, covariance, float(np.sqrt(np.mean(off**2))), misfit)
 
 
