@@ -90,7 +90,7 @@ def draw_scene(room: Room, layout: CrossLayout, room_from_camera: RigidTransform
         rods=rods,
         rod_colours=rod_colours,
         gradient=rng.normal(size=3) * 6e-5,
-        tint=rng.uniform(0.55, 1.1) * np.array([1.0 + warm, 1.0, 1.0 - warm]),
+        tint=rng.uniform(0.5, 1.0) * np.array([1.0 + warm, 1.0, 1.0 - warm]),
         glare=_glare(bare, rng),
     )
 
