@@ -3,9 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from glisson.core.arrays import FloatArray, frozen_floats, unit_vector
 from glisson.core.errors import BadInput
+from glisson.core.transform import RigidTransform
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +63,9 @@ class Room:
             object.__setattr__(self, name, frozen_floats(getattr(self, name), (3,), name))
         if not self.areas:
             raise BadInput("The room has no area where crosses may hang.")
+        for area in self.areas:
+            if np.cross(area.right, area.down) @ (area.centre_mm - [0.0, 0.0, self.size_mm[2] / 2.0]) <= 0.0:
+                raise BadInput(f"The area {area.name!r} faces outwards; turn its right or its down round.")
         half = self.size_mm / 2.0 * [1.0, 1.0, 2.0]
         low, high = half * [-1.0, -1.0, 0.0], half
         if not (low < self.trocar_low_mm).all() or not (self.trocar_high_mm < high).all():
@@ -69,3 +74,10 @@ class Room:
             raise BadInput("The trocar's region has a least coordinate above the largest.")
         if not 0.0 <= self.tilt_rad < np.pi / 2.0:
             raise BadInput("The trocar's tilt must lie between 0° and 90°.")
+
+    def draw_pose(self, rng: np.random.Generator) -> RigidTransform:
+        """A pose `room_from_trocar`: anywhere in the region, the axis anywhere within the tilt, any roll."""
+        lean = np.arccos(rng.uniform(np.cos(self.tilt_rad), 1.0))
+        direction, roll = rng.uniform(0.0, 2.0 * np.pi, 2)
+        rotation = Rotation.from_euler("ZYZ", [direction, lean, roll]).as_matrix()
+        return RigidTransform("room", "trocar", rotation, rng.uniform(self.trocar_low_mm, self.trocar_high_mm))

@@ -89,7 +89,7 @@ def draw_scene(room: Room, layout: CrossLayout, room_from_camera: RigidTransform
         patches=(*_false_patches(room, layout, rng), *bare.patches),
         rods=rods,
         rod_colours=rod_colours,
-        gradient=rng.normal(size=3) * 6e-5,
+        gradient=rng.normal(size=3) * [6e-5, 6e-5, 0.0],
         tint=rng.uniform(0.5, 1.0) * np.array([1.0 + warm, 1.0, 1.0 - warm]),
         glare=_glare(bare, rng),
     )
