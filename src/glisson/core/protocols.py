@@ -19,6 +19,7 @@ from glisson.core.crosses import CrossLayout
 from glisson.core.deformation import Deformation
 from glisson.core.fine_zone import FineZone
 from glisson.core.image import LabelMap, Volume
+from glisson.core.instruments import InstrumentLibrary, SeenInstrument
 from glisson.core.landmarks import Landmarks
 from glisson.core.localisation import Localisation
 from glisson.core.mesh import TetMesh, TriangleSurface
@@ -27,6 +28,7 @@ from glisson.core.observations import Observations
 from glisson.core.scenario import Scenario
 from glisson.core.structures import VesselTree
 from glisson.core.transform import RigidTransform
+from glisson.core.trocar import Trocar
 
 
 class Progress(Protocol):
@@ -226,4 +228,17 @@ class Localiser(Technique, Protocol):
 
         Raises:
             BadInput: the image has another size than the camera's.
+        """
+
+
+class InstrumentRecogniser(Technique, Protocol):
+    """Tells which instrument is in a trocar, and where (entry-point group `glisson.instrument_recognisers`)."""
+
+    def recognise(self, image: NDArray[np.uint8], trocar: Trocar, library: InstrumentLibrary) -> SeenInstrument:
+        """The instrument in an image (h, w, 3) of the trocar's camera.
+
+        Raises:
+            BadInput: the image is not of the camera's size.
+            StageFailed: none is seen (unobservable), which one or where is in doubt (ambiguous), or what is seen
+                cannot be: a code that is not in the library, a mirrored image, a wheel of another size (bad_input).
         """
