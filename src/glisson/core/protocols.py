@@ -14,11 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glisson.core.arrays import FloatArray
+from glisson.core.camera import Camera
+from glisson.core.crosses import CrossLayout
 from glisson.core.deformation import Deformation
 from glisson.core.fine_zone import FineZone
 from glisson.core.image import LabelMap, Volume
 from glisson.core.instruments import InstrumentLibrary, SeenInstrument
 from glisson.core.landmarks import Landmarks
+from glisson.core.localisation import Localisation
 from glisson.core.mesh import TetMesh, TriangleSurface
 from glisson.core.model import Material, Model
 from glisson.core.observations import Observations
@@ -213,13 +216,18 @@ class SurfaceReconstructor(Technique, Protocol):
 
 
 class Localiser(Technique, Protocol):
-    """Finds the pose of a camera or tool (entry-point group `glisson.localisers`)."""
+    """Finds where a trocar is from an image of its camera (entry-point group `glisson.localisers`)."""
 
-    def localise(self, image: NDArray[np.uint8]) -> RigidTransform:
-        """Pose with covariance from an image (h, w, 3).
+    def localise(self, image: NDArray[np.uint8], camera: Camera, layout: CrossLayout) -> Localisation:
+        """The pose of the trocar in the room; what stands against it is told by the status.
+
+        Args:
+            image: [row, column, red green blue].
+            camera: has taken it.
+            layout: crosses that hang in the room.
 
         Raises:
-            StageFailed: no pose, or an ambiguous one.
+            BadInput: the image has another size than the camera's.
         """
 
 
