@@ -40,6 +40,8 @@ COMMANDS = {
     "resections": "list what each liver resection would take of the segments, and what would remain",
     "export": "write the labels of a case as one segmentation for other programs (3D Slicer, DICOM)",
     "deidentify": "copy DICOM files without what tells who the patient is (the standard's basic profile)",
+    "layout": "propose where crosses should hang in a room, or measure where they do",
+    "localize": "tell where a trocar is, from an image of its camera that shows crosses of known place",
     "benchmark": "measure Glisson beside other engines (in a checkout; make bench installs them)",
     "study": "compute many points, each once, and tell what they say together",
     "verify": "compare the tissue mechanics with closed forms, published figures and another engine",

@@ -31,7 +31,7 @@ _ROUNDS = 4
 class DesignParameters:
     """What crosses there are, and what they are for."""
 
-    count: int = parameter(14, "Number of crosses.", 2, len(cross_codes()))
+    count: int = parameter(15, "Number of crosses.", 2, len(cross_codes()))
     size_mm: float = parameter(400.0, "Size of the crosses, mm.", 50.0, 2000.0)
     tool_mm: float = parameter(300.0, "Length of the tool whose tip is to be known, mm.", 0.0, 1000.0)
     views: int = parameter(300, "Number of random views.", 10, 10000)
