@@ -2,9 +2,10 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 
-from glisson.core.errors import StageFailed
-from glisson.core.instruments import Instrument, InstrumentLibrary
+from glisson.core.errors import BadInput, StageFailed
+from glisson.core.instruments import SECTORS, WHEEL_COLOURS, Instrument, InstrumentLibrary
 from glisson.core.status import Status
 
 LEAST_APART = 2
@@ -44,6 +45,23 @@ def alike_codes(library: InstrumentLibrary) -> tuple[Alike, ...]:
             pairs.append((other.name, min(_differing(one.colours, way) for way in _either_way(other.colours))))
         found += [Alike(one.name, name, sectors) for name, sectors in pairs if sectors < LEAST_APART]
     return tuple(found)
+
+
+def free_code(library: InstrumentLibrary) -> tuple[str, ...]:
+    """Colours for one more instrument: as far from all others, and from their own other ways round, as may be.
+
+    Raises:
+        BadInput: no code is left that can be told from all others.
+    """
+    best, apart = None, LEAST_APART - 1
+    for colours in product(WHEEL_COLOURS, repeat=SECTORS):
+        own = [_differing(colours, way) for way in (*list(_turned(colours))[1:], *_turned(colours[::-1]))]
+        others = [_differing(colours, way) for one in library.instruments for way in _either_way(one.colours)]
+        if min(own) >= LEAST_APART and min(others, default=SECTORS) > apart:
+            best, apart = colours, min(others, default=SECTORS)
+    if best is None:
+        raise BadInput("No colour code is left that can be told from all others in the library.")
+    return best
 
 
 def instrument_of(reading: Reading, library: InstrumentLibrary) -> tuple[Instrument, int]:
