@@ -42,6 +42,8 @@ COMMANDS = {
     "deidentify": "copy DICOM files without what tells who the patient is (the standard's basic profile)",
     "layout": "propose where crosses should hang in a room, or measure where they do",
     "localize": "tell where a trocar is, from an image of its camera that shows crosses of known place",
+    "instruments": "keep a library of instruments, recognise them in a trocar's camera, and tell when they were in use",
+    "markers": "write wheels, crosses and calibration boards as PDF to print at true scale",
     "benchmark": "measure Glisson beside other engines (in a checkout; make bench installs them)",
     "study": "compute many points, each once, and tell what they say together",
     "verify": "compare the tissue mechanics with closed forms, published figures and another engine",
