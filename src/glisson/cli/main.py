@@ -43,6 +43,7 @@ COMMANDS = {
     "layout": "propose where crosses should hang in a room, or measure where they do",
     "localize": "tell where a trocar is, from an image of its camera that shows crosses of known place",
     "instruments": "keep a library of instruments, recognise them in a trocar's camera, and tell when they were in use",
+    "pointer": "tell points, distances, strokes and a resection plane that an instrument's tip has drawn",
     "markers": "write wheels, crosses and calibration boards as PDF to print at true scale",
     "benchmark": "measure Glisson beside other engines (in a checkout; make bench installs them)",
     "study": "compute many points, each once, and tell what they say together",

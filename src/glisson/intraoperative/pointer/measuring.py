@@ -29,7 +29,8 @@ class Length:
 def pointed_at(track: TipTrack) -> PointedAt:
     """The point on which a tip rested: the mean of its places, weighted by their covariances.
 
-    The covariance grows by the spread of the places where that is more than their covariances say.
+    Play and the trocar's own place err alike all the while, so that many places are no surer than one; what they are
+    spread by is added.
 
     Raises:
         BadInput: the track is empty.
@@ -37,13 +38,10 @@ def pointed_at(track: TipTrack) -> PointedAt:
     if not len(track):
         raise BadInput("The tip was not seen in this time; choose another.")
     information = np.linalg.inv(track.covariance_mm2)
-    covariance = np.linalg.inv(information.sum(axis=0))
-    point = covariance @ np.einsum("nij,nj->i", information, track.points_mm)
+    typical = np.linalg.inv(information.mean(axis=0))
+    point = typical @ np.einsum("nij,nj->i", information, track.points_mm) / len(track)
     off = track.points_mm - point
-    if len(track) > 1:
-        ratio = float(np.einsum("ni,nij,nj->", off, information, off)) / (3.0 * (len(track) - 1))
-        covariance = covariance * max(ratio, 1.0)
-    return PointedAt(point, covariance)
+    return PointedAt(point, typical + off.T @ off / len(track) ** 2)
 
 
 def distance(one: PointedAt, other: PointedAt) -> Length:
@@ -61,7 +59,7 @@ def distance(one: PointedAt, other: PointedAt) -> Length:
 
 
 def stroke_length(track: TipTrack) -> Length:
-    """Along a smoothed stroke; the errors of its points are taken as independent.
+    """Along a smoothed stroke. Errors that its points share do not count; all are taken as independent.
 
     Raises:
         BadInput: fewer than two points.

@@ -39,7 +39,8 @@ class DrawnPlane:
 def plane_of(track: TipTrack, towards: FloatArray) -> DrawnPlane:
     """The most likely plane through a line drawn on the organ, each tip weighted by its error along the normal.
 
-    A line on a curved organ spans a plane; on a flat one it does not, and the covariance says so.
+    A line on a curved organ spans a plane; on a flat one it does not, and the covariance says so. An error that all
+    tips share does not tilt the plane but shifts it, so that its offset is no surer than one tip.
 
     Args:
         track: the line, smoothed or not.
@@ -63,6 +64,7 @@ def plane_of(track: TipTrack, towards: FloatArray) -> DrawnPlane:
     misfit = float((off**2 / variances).sum()) / free if free else 0.0
     information = (rows / variances[:, None]).T @ rows
     covariance = np.asarray(np.linalg.inv(information) * max(misfit, 1.0), dtype=np.float64)
+    covariance[2, 2] += 1.0 / float(np.mean(1.0 / variances))
     return DrawnPlane(plane, covariance, float(np.sqrt(np.mean(off**2))), misfit)
 
 

@@ -9,15 +9,15 @@ _SWING_MM_S = 200.0
 """Standard deviation of the velocity of which nothing is known yet."""
 
 
-def smoothed(track: TipTrack, jerkiness: float = 200.0) -> TipTrack:
+def smoothed(track: TipTrack, jerkiness: float = 40.0) -> TipTrack:
     """The most likely path of a tip, with what uncertainty it leaves at each time.
 
-    A tip that is seen better counts more. Errors that stay the same over the whole track, such as that of the trocar's
-    place, are not noise: add them afterwards, by `TipTrack.moved`.
+    A tip that is seen better counts more. The covariances that it leaves hold where the tips' errors are independent;
+    an error that stays the same over the track, such as play, is in none of them.
 
     Args:
         track: as it was measured, each tip with an error of its own.
-        jerkiness: how fast the velocity wanders, mm/s per √s; a hand that draws has some 200.
+        jerkiness: how fast the velocity wanders, mm/s per √s.
     """
     if len(track) < 2:
         return track
