@@ -59,6 +59,10 @@ class RoomViews:
         centre = room_from_camera.translation_mm
         return bool(inside) and all(_first_rod(*centre, *(place - centre), scene.rods, 1.0) < 0 for place in places)
 
+    def corners(self, cross: Cross, room_from_camera: RigidTransform) -> FloatArray:
+        """Where its corners are (12, 2), px."""
+        return seen_at(self.camera, room_from_camera.inverse().apply(cross.corners_mm))
+
     def _window(self, patch: Patch, room_from_camera: RigidTransform) -> NDArray[np.int64] | None:
         """First and last row and column between which a sheet is seen; None where it is not."""
         if (patch.centre_mm - room_from_camera.translation_mm) @ np.cross(patch.right, patch.down) <= 0.0:

@@ -39,9 +39,7 @@ def circle_poses(conic: FloatArray, radius_mm: float) -> list[tuple[FloatArray, 
     found = []
     for side in (1.0, -1.0):
         normal = side * sine * vectors[:, 0] - cosine * vectors[:, 2]
-        centre = away * (
-            side * third / second * sine * vectors[:, 0] - first / second * cosine * vectors[:, 2]
-        )
+        centre = away * (side * third / second * sine * vectors[:, 0] - first / second * cosine * vectors[:, 2])
         centre = centre if centre[2] > 0.0 else -centre
         found.append((centre, normal if normal @ centre < 0.0 else -normal))
     return found

@@ -58,9 +58,7 @@ def _colour(counts: NDArray[np.intp], all_of_it: int) -> str | None:
     return WHEEL_COLOURS[int(counts.argmax())]
 
 
-def _labels(
-    image: NDArray[np.uint8], camera: Camera, pose: RigidTransform, radius_mm: float
-) -> NDArray[np.int_]:
+def _labels(image: NDArray[np.uint8], camera: Camera, pose: RigidTransform, radius_mm: float) -> NDArray[np.int_]:
     """The colour's number (radii, degrees) at places of the sectors, −1 where there is none."""
     margin = 0.2 * (RINGS.outer - RINGS.inner)
     radii = np.linspace(RINGS.inner + margin, RINGS.outer - margin, _RADII)

@@ -151,7 +151,7 @@ def _equations(
                 columns += [6 * (number - 1) + k for k in range(6)]
                 jacobian += [by_point @ -np.array([cross_matrix(arm) for arm in arms]), by_point]
             columns.append(size - 1)
-            jacobian.append((by_point @ turned[:, :, None]))
+            jacobian.append(by_point @ turned[:, :, None])
             by_unknowns = np.concatenate(jacobian, axis=2)
             information = view.information[rows]
             squares = np.einsum("ni,nij,nj->n", off, information, off)

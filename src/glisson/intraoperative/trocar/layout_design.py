@@ -159,9 +159,7 @@ def _best(table: _Prediction, others: list[int], places: list[_Place], size_mm: 
     ]
     if not free:
         raise BadInput("The areas have no room for so many crosses; take fewer or smaller ones.")
-    return min(
-        free, key=lambda k: (np.mean(np.log(table.tip_errors([*others, k]))), -table.whole[:, k].sum())
-    )
+    return min(free, key=lambda k: (np.mean(np.log(table.tip_errors([*others, k]))), -table.whole[:, k].sum()))
 
 
 def is_whole(cross: Cross, camera: Camera, camera_from_room: RigidTransform) -> bool:

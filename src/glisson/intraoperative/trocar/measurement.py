@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from glisson.core.arrays import FloatArray, IntArray
+from glisson.core.arrays import FloatArray
 from glisson.core.camera import Camera
 from glisson.core.crosses import COLOURS, Cross, CrossLayout
 from glisson.core.transform import RigidTransform
@@ -105,7 +105,9 @@ def _fitted(
 ) -> _Lines:  # fmt: skip
     """The edges from each corner of the crosses to the next."""
     first, last = places.reshape(-1, 3), np.roll(places, -1, axis=1).reshape(-1, 3)
-    colours = np.array([COLOURS.index(layout.crosses[n].colours[arm]) for n in numbers for arm in _EDGE_ARMS], dtype=np.int64)
+    colours = np.array(
+        [COLOURS.index(layout.crosses[n].colours[arm]) for n in numbers for arm in _EDGE_ARMS], dtype=np.int64
+    )
     pixels, normals, shares = _samples(camera, camera_from_room, first, last)
     offsets = edge_offsets(
         image, pixels.reshape(-1, 2), normals.reshape(-1, 2), np.repeat(colours, _SAMPLES), reach_px
@@ -137,9 +139,7 @@ def _slopes(camera_from_room: RigidTransform, places: FloatArray) -> FloatArray:
     return np.asarray(in_camera[:, :2] / in_camera[:, 2:])
 
 
-def _lines(
-    slopes: FloatArray, there: NDArray[np.bool_], first: FloatArray, last: FloatArray, camera: Camera
-) -> _Lines:
+def _lines(slopes: FloatArray, there: NDArray[np.bool_], first: FloatArray, last: FloatArray, camera: Camera) -> _Lines:
     """Lines through samples (edges, samples, 2) beside the expected edges from `first` to `last` (edges, 2)."""
     pixel = 1.0 / float(camera.focal_px.mean())
     length = np.linalg.norm(last - first, axis=1)
@@ -157,13 +157,16 @@ def _lines(
     # Samples nearer to each other than the blur share their noise.
     shared = np.maximum(1.0, _SAMPLES * 1.5 * pixel / length)
     ends = np.stack([good & (low < _NEXT_CORNER), good & (high > 1.0 - _NEXT_CORNER)], axis=1)
-    variances = np.stack(
-        [
-            scatter**2 * shared * (1.0 / np.maximum(count, 1) + (end - middle) ** 2 / np.maximum(spread, 1e-9))
-            for end in (0.0, 1.0)
-        ],
-        axis=1,
-    ) + (_FLOOR_PX * pixel) ** 2
+    variances = (
+        np.stack(
+            [
+                scatter**2 * shared * (1.0 / np.maximum(count, 1) + (end - middle) ** 2 / np.maximum(spread, 1e-9))
+                for end in (0.0, 1.0)
+            ],
+            axis=1,
+        )
+        + (_FLOOR_PX * pixel) ** 2
+    )
     # h = level + slant · s, as a line of its own in the slopes.
     tilted = normals - (slant / length)[:, None] * along
     size = np.linalg.norm(tilted, axis=1)

@@ -46,7 +46,9 @@ def cross_outlines(image: NDArray[np.uint8]) -> list[FloatArray]:
 
 def _is_cut(corners: FloatArray, shape: tuple[int, ...]) -> bool:
     """Whether the image may end within the cross."""
-    return bool((corners < _BORDER_PX).any() or (corners > [shape[1] - 1 - _BORDER_PX, shape[0] - 1 - _BORDER_PX]).any())
+    return bool(
+        (corners < _BORDER_PX).any() or (corners > [shape[1] - 1 - _BORDER_PX, shape[0] - 1 - _BORDER_PX]).any()
+    )
 
 
 @compiled
