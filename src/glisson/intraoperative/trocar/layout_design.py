@@ -183,7 +183,7 @@ def _to_camera(room_from_trocar: RigidTransform) -> RigidTransform:
 
 
 def _tip_by_pose(camera_from_room: RigidTransform, tool_mm: float) -> FloatArray:
-    """Derivative (3, 6) of the tip in the room by d and e of camera_from_room; the tool lies along the axis, inwards."""
+    """Derivative (3, 6) of the tip in the room by d and e of camera_from_room; the tool lies inwards along the axis."""
     back = camera_from_room.rotation.T
     arm = np.array([0.0, 0.0, -tool_mm]) - camera_from_room.translation_mm
     return np.hstack([back @ cross_matrix(arm), -back])

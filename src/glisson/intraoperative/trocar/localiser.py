@@ -154,7 +154,7 @@ def _unexplained(seen: SeenCorners, layout: CrossLayout) -> Localisation:
         return Localisation(Status.BAD_INPUT, _size_sentence(size), crosses=names, corners_px=seen.pixels)
     return Localisation(
         Status.UNOBSERVABLE,
-        f"No pose explains the crosses that are seen, {_listed(names)}; check the layout, and whether one has been moved.",
+        f"No pose explains the crosses that are seen, {_listed(names)}; check the layout, and whether one was moved.",
         crosses=names,
         corners_px=seen.pixels,
     )

@@ -27,10 +27,8 @@ _FLOOR_PX = 0.03
 """What paper, print and light leave of every edge, however many samples it has."""
 
 _ROBUST_FITS = 4
-_ARMS = np.array([1, 1, 0, 2, 2, 0, 3, 3, 0, 4, 4, 0])
-"""Colour of the ink at each corner's arm; the edge from a corner to the next has that of `_EDGE_ARMS`."""
-
-_EDGE_ARMS = np.array([1, 1, 2, 2, 2, 3, 3, 3, 4, 4, 4, 1])
+_EDGE_ARMS = (1, 1, 2, 2, 2, 3, 3, 3, 4, 4, 4, 1)
+"""The edge from a corner to the next bounds the ink of this one of the cross's colours."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +106,7 @@ def _fitted(
     colours = np.array(
         [COLOURS.index(layout.crosses[n].colours[arm]) for n in numbers for arm in _EDGE_ARMS], dtype=np.int64
     )
-    pixels, normals, shares = _samples(camera, camera_from_room, first, last)
+    pixels, normals = _samples(camera, camera_from_room, first, last)
     offsets = edge_offsets(
         image, pixels.reshape(-1, 2), normals.reshape(-1, 2), np.repeat(colours, _SAMPLES), reach_px
     ).reshape(-1, _SAMPLES)
@@ -120,8 +118,8 @@ def _fitted(
 
 def _samples(
     camera: Camera, camera_from_room: RigidTransform, first: FloatArray, last: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Pixels and normals (edges, samples, 2) and shares of the length (edges, samples) on edges between two corners."""
+) -> tuple[FloatArray, FloatArray]:
+    """Pixels and normals (edges, samples, 2) on edges between two corners."""
     ends = project(camera, camera_from_room, np.vstack([first, last])).reshape(2, -1, 2)
     length = np.linalg.norm(ends[1] - ends[0], axis=1)
     margin = np.minimum(_FROM_CORNER_PX / np.maximum(length, 1e-9), 0.3)[:, None]
@@ -131,7 +129,7 @@ def _samples(
     along = np.gradient(pixels, axis=1)
     along /= np.maximum(np.linalg.norm(along, axis=2, keepdims=True), 1e-12)
     # Clockwise round the ink, with v downwards, paper is on the left.
-    return pixels, np.stack([along[:, :, 1], -along[:, :, 0]], axis=2), shares
+    return pixels, np.stack([along[:, :, 1], -along[:, :, 0]], axis=2)
 
 
 def _slopes(camera_from_room: RigidTransform, places: FloatArray) -> FloatArray:

@@ -162,7 +162,7 @@ def global_pose(seen: SeenCorners) -> RefinedPose | None:
     )
     best: RefinedPose | None = None
     for turned, shift in zip(poses[:found], shifts[:found], strict=True):
-        rotation = turn(turned.ravel())
+        rotation = turn(np.asarray(turned, dtype=np.float64).ravel())
         pose = refined_pose(seen.points_mm, seen.slopes, seen.information, rotation, shift.ravel() - rotation @ middle)
         if np.isfinite(pose.squares).all() and (best is None or pose.squares.sum() < best.squares.sum()):
             best = pose
@@ -200,8 +200,8 @@ def _second(pose: RefinedPose, used: SeenCorners, found: FoundPose) -> RigidTran
         return None
     turned, _ = cv2.Rodrigues(other.rotation @ pose.rotation.T)
     step = np.concatenate([turned.ravel(), other.translation_mm - pose.translation_mm])
-    if step @ np.linalg.solve(found.camera_from_room.covariance, step) < _APART:
+    covariance = found.camera_from_room.covariance
+    if covariance is not None and step @ np.linalg.solve(covariance, step) < _APART:
         return None
-    return RigidTransform(
-        "camera", "room", other.rotation, other.translation_mm, np.linalg.inv(other.normal) * found.scale**2
-    )
+    its_own = np.asarray(np.linalg.inv(other.normal) * found.scale**2, dtype=np.float64)
+    return RigidTransform("camera", "room", other.rotation, other.translation_mm, its_own)

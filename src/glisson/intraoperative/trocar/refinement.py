@@ -42,7 +42,7 @@ def refined_pose(
         if not np.isfinite(squares.sum()):
             break  # something lies behind the camera, where there is no way back
         # Turns and shifts differ in size by a thousand, so the damping goes by the diagonal (Marquardt).
-        step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), -gradient)
+        step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), -gradient).astype(np.float64)
         turned = turn(step[:3]) @ rotation
         moved = translation + step[3:]
         tried, its_normal, its_gradient = normal_equations(points, slopes, information, turned, moved)
@@ -106,5 +106,8 @@ def turn(vector: FloatArray) -> FloatArray:
     matrix[0, 1], matrix[0, 2], matrix[1, 2] = -vector[2], vector[1], -vector[0]
     matrix = matrix - matrix.T
     if angle < 1e-8:
-        return np.eye(3) + matrix + 0.5 * matrix @ matrix
-    return np.eye(3) + np.sin(angle) / angle * matrix + (1.0 - np.cos(angle)) / angle**2 * matrix @ matrix
+        return np.eye(3) + matrix
+    rotation: FloatArray = (
+        np.eye(3) + np.sin(angle) / angle * matrix + (1.0 - np.cos(angle)) / angle**2 * matrix @ matrix
+    )
+    return rotation

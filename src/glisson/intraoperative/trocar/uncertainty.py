@@ -23,7 +23,8 @@ def loosened(seen: SeenCorners, pose: RefinedPose, camera: Camera, layout: Cross
         spread += by_camera @ camera.covariance @ by_camera.transpose(0, 2, 1)
     by_place, covariances = _by_place(seen, pose, by_pose, layout)
     spread += by_place @ covariances[seen.cross] @ by_place.transpose(0, 2, 1)
-    return replace(seen, information=np.linalg.inv(np.linalg.inv(seen.information) + spread))
+    information = np.linalg.inv(np.linalg.inv(seen.information) + spread)
+    return replace(seen, information=np.asarray(information, dtype=np.float64))
 
 
 def pose_covariance(
@@ -42,11 +43,11 @@ def pose_covariance(
         layout: with covariances of the places, if known.
     """
     if _is_exact(used, camera, layout):
-        exact: FloatArray = np.linalg.inv(pose.normal) * scale**2
-        return exact
+        return np.asarray(np.linalg.inv(pose.normal) * scale**2, dtype=np.float64)
     by_pose, by_camera = _derivatives(used, pose, camera)
     gain = np.linalg.solve(pose.normal, by_pose.transpose(0, 2, 1) @ weights)
-    total: FloatArray = (gain @ np.linalg.inv(used.information) @ gain.transpose(0, 2, 1)).sum(axis=0) * scale**2
+    noise = np.asarray(np.linalg.inv(used.information), dtype=np.float64)
+    total: FloatArray = (gain @ noise @ gain.transpose(0, 2, 1)).sum(axis=0) * scale**2
     if camera.covariance is not None:
         of_camera = (gain @ by_camera).sum(axis=0)
         total += of_camera @ camera.covariance @ of_camera.T

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import Any, ClassVar
 
 import numpy as np
@@ -16,7 +17,7 @@ from glisson.studies.trocar.telling import as_lines, as_page, draw_tips
 
 WRONG_MM, WRONG_DEG = 5.0, 1.0
 IMAGE_COUNT, CORNER_COUNT = 1000, 9000
-QUICK_IMAGES, QUICK_CORNERS = 40, 900
+QUICK_IMAGES, QUICK_CORNERS = 40, 600
 _IMAGE_BLOCK, _CORNER_BLOCK = 10, 150
 SHARES = {RECOMMENDED: 0.7, ANY: 0.2, SURVEYED: 0.1}
 """Parts of the views by layout."""
@@ -40,27 +41,26 @@ class TrocarStudy:
         return cls(seed, QUICK_IMAGES, QUICK_CORNERS) if quick else cls(seed)
 
     def preparations(self) -> Sequence[Point]:
-        """None."""
-        return ()
+        """One view, so that all is compiled before."""
+        return [Point(IMAGES, {"stream": self.seed, "layout": RECOMMENDED, "first": self.images, "count": 1})]
 
     def points(self, prepared: Mapping[str, Outcome]) -> Sequence[Point]:
-        """Blocks of views; those of corners first, they take little."""
-        points = []
+        """Blocks of views, of all kinds in turn."""
+        groups = []
         for task, total, size, cost in (
             (CORNERS, self.corners, _CORNER_BLOCK, 1.0),
-            (IMAGES, self.images, _IMAGE_BLOCK, 10.0),
+            (IMAGES, self.images, _IMAGE_BLOCK, 5.0),
         ):
             for layout, share in SHARES.items():
                 count = round(share * total)
-                for first in range(0, count, size):
-                    inputs = {
-                        "stream": self.seed,
-                        "layout": layout,
-                        "first": first,
-                        "count": min(size, count - first),
-                    }
-                    points.append(Point(task, inputs, cost))
-        return points
+                inputs = {"stream": self.seed, "layout": layout}
+                groups.append(
+                    [
+                        Point(task, {**inputs, "first": first, "count": min(size, count - first)}, cost)
+                        for first in range(0, count, size)
+                    ]
+                )
+        return [point for turn in zip_longest(*groups) for point in turn if point is not None]
 
     def conclude(self, prepared: Mapping[str, Outcome], done: Mapping[str, Outcome]) -> Conclusion:
         """Errors of what is not flagged, by layout, source and number of crosses, and all silent errors."""
@@ -138,8 +138,9 @@ def _group(rows: Sequence[Row], layout: str, source: str, crosses: str) -> dict[
 
 
 def _is_silent(row: Row, prefix: str = "") -> bool:
-    wrong = row[f"{prefix}status"] == "converged"
-    return wrong and (row[f"{prefix}position_mm"] > WRONG_MM or row[f"{prefix}angle_deg"] > WRONG_DEG)
+    if row[f"{prefix}status"] != "converged":
+        return False
+    return bool(row[f"{prefix}position_mm"] > WRONG_MM or row[f"{prefix}angle_deg"] > WRONG_DEG)
 
 
 def _flagged(rows: Sequence[Row]) -> float | None:
