@@ -68,7 +68,7 @@ def _design(arguments: argparse.Namespace, progress: Progress) -> Answer:
     }
     three = float(np.mean(design.visible >= 3))
     text = [
-        f"crosses   {len(design.layout)}; {100.0 * three:.1f} % of {len(design.visible)} views show three or more whole",
+        f"crosses   {len(design.layout)}; {100.0 * three:.1f} % of {len(design.visible)} views show three or more",
         f"tip       predicted error median {tip['median']:.2f} mm, 95th percentile {tip['p95']:.2f} mm, "
         f"worst {tip['worst']:.2f} mm",
         f"written   {arguments.out}",

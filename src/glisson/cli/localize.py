@@ -33,9 +33,7 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
     started = time.perf_counter()
-    done = localise_trocar(
-        arguments.image, arguments.camera, arguments.layout, arguments.technique, out=arguments.out
-    )
+    done = localise_trocar(arguments.image, arguments.camera, arguments.layout, arguments.technique, out=arguments.out)
     found = done.found
     values = _values(found) | {"picture": str(done.picture), "seconds": time.perf_counter() - started}
     exit_code = 0 if found.status.is_good else 2 if found.status is Status.BAD_INPUT else 1

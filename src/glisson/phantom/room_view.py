@@ -57,7 +57,14 @@ class RoomViews:
         pixels = seen_at(self.camera, in_camera)
         inside = (pixels > 1.0).all() and (pixels < [self.camera.width - 2.0, self.camera.height - 2.0]).all()
         centre = room_from_camera.translation_mm
-        return bool(inside) and all(_first_rod(*centre, *(place - centre), scene.rods, 1.0) < 0 for place in places)
+        rays = places - centre
+        return bool(inside) and all(
+            _first_rod(centre[0], centre[1], centre[2], ray[0], ray[1], ray[2], scene.rods, 1.0) < 0 for ray in rays
+        )
+
+    def corners(self, cross: Cross, room_from_camera: RigidTransform) -> FloatArray:
+        """Where its corners are (12, 2), px."""
+        return seen_at(self.camera, room_from_camera.inverse().apply(cross.corners_mm))
 
     def _window(self, patch: Patch, room_from_camera: RigidTransform) -> NDArray[np.int64] | None:
         """First and last row and column between which a sheet is seen; None where it is not."""

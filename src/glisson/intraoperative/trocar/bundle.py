@@ -52,7 +52,7 @@ def adjusted(
     damping = 1e-4
     cost, normal, gradient, _ = _equations(bundle, camera, layout, known)
     for _ in range(_ITERATIONS):
-        step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), -gradient)
+        step = np.asarray(np.linalg.solve(normal + damping * np.diag(np.diag(normal)), -gradient), dtype=np.float64)
         tried = _moved(bundle, step)
         its_cost, its_normal, its_gradient, _ = _equations(tried, camera, layout, known)
         if its_cost > cost:
@@ -134,7 +134,7 @@ def _equations(
     size = crosses + 6 * len(bundle.poses) + 1
     normal, gradient, cost = np.zeros((size, size)), np.zeros(size), 0.0
     errors = []
-    slopes_of = Camera(camera.width, camera.height, [1.0, 1.0], [0.0, 0.0])
+    slopes_of = Camera(camera.width, camera.height, np.ones(2), np.zeros(2))
     for v, (view, pose) in enumerate(zip(bundle.views, bundle.poses, strict=True)):
         for number in view.crosses:
             rows = view.cross == number
@@ -151,7 +151,7 @@ def _equations(
                 columns += [6 * (number - 1) + k for k in range(6)]
                 jacobian += [by_point @ -np.array([cross_matrix(arm) for arm in arms]), by_point]
             columns.append(size - 1)
-            jacobian.append((by_point @ turned[:, :, None]))
+            jacobian.append(by_point @ turned[:, :, None])
             by_unknowns = np.concatenate(jacobian, axis=2)
             information = view.information[rows]
             squares = np.einsum("ni,nij,nj->n", off, information, off)

@@ -76,7 +76,7 @@ def _is_ink(ink: FloatArray, paper: FloatArray, hue: FloatArray) -> bool:
     own = own - own.min()
     if own.max() < 0.08:
         return False
-    return np.sqrt(((own / own.max() - hue) ** 2).sum()) < _HUE_OFF
+    return bool(np.sqrt(((own / own.max() - hue) ** 2).sum()) < _HUE_OFF)
 
 
 @compiled

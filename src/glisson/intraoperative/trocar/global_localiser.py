@@ -23,7 +23,5 @@ class GlobalLocaliser(CrossLocaliser):
     def _first_pose(self, seen: SeenCorners, camera: Camera, layout: CrossLayout) -> FoundPose | None:
         return pose_from_corners(seen, camera, layout)
 
-    def _pose(
-        self, seen: SeenCorners, camera: Camera, layout: CrossLayout, before: RigidTransform
-    ) -> FoundPose | None:
+    def _pose(self, seen: SeenCorners, camera: Camera, layout: CrossLayout, before: RigidTransform) -> FoundPose | None:
         return pose_from_corners(seen, camera, layout)

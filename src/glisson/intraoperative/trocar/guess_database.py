@@ -49,17 +49,13 @@ class GuessDatabase(CrossLocaliser):
         guess = RigidTransform("camera", "room", self._rotations[best], self._shifts[best])
         return self._pose(seen, camera, layout, guess)
 
-    def _pose(
-        self, seen: SeenCorners, camera: Camera, layout: CrossLayout, before: RigidTransform
-    ) -> FoundPose | None:
+    def _pose(self, seen: SeenCorners, camera: Camera, layout: CrossLayout, before: RigidTransform) -> FoundPose | None:
         if len(seen) < 6:
             return None
-        pose = refined_pose(
-            seen.points_mm, seen.slopes, seen.information, before.rotation, before.translation_mm
-        )
+        pose = refined_pose(seen.points_mm, seen.slopes, seen.information, before.rotation, before.translation_mm)
         everything = np.ones(len(seen), dtype=bool)
         good = np.isfinite(pose.squares).all() and np.linalg.cond(pose.normal) < 1e15
-        return with_covariance(pose, seen, everything, camera, layout) if good else None
+        return with_covariance(pose, seen, seen, everything, camera, layout) if good else None
 
 
 def _database(parameters: DatabaseParameters) -> tuple[FloatArray, FloatArray]:

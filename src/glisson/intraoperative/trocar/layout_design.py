@@ -159,9 +159,7 @@ def _best(table: _Prediction, others: list[int], places: list[_Place], size_mm: 
     ]
     if not free:
         raise BadInput("The areas have no room for so many crosses; take fewer or smaller ones.")
-    return min(
-        free, key=lambda k: (np.mean(np.log(table.tip_errors([*others, k]))), -table.whole[:, k].sum())
-    )
+    return min(free, key=lambda k: (np.mean(np.log(table.tip_errors([*others, k]))), -table.whole[:, k].sum()))
 
 
 def is_whole(cross: Cross, camera: Camera, camera_from_room: RigidTransform) -> bool:
@@ -185,7 +183,7 @@ def _to_camera(room_from_trocar: RigidTransform) -> RigidTransform:
 
 
 def _tip_by_pose(camera_from_room: RigidTransform, tool_mm: float) -> FloatArray:
-    """Derivative (3, 6) of the tip in the room by d and e of camera_from_room; the tool lies along the axis, inwards."""
+    """Derivative (3, 6) of the tip in the room by d and e of camera_from_room; the tool lies inwards along the axis."""
     back = camera_from_room.rotation.T
     arm = np.array([0.0, 0.0, -tool_mm]) - camera_from_room.translation_mm
     return np.hstack([back @ cross_matrix(arm), -back])

@@ -77,9 +77,7 @@ class CrossLocaliser(ABC):
         """A pose without any before."""
 
     @abstractmethod
-    def _pose(
-        self, seen: SeenCorners, camera: Camera, layout: CrossLayout, before: RigidTransform
-    ) -> FoundPose | None:
+    def _pose(self, seen: SeenCorners, camera: Camera, layout: CrossLayout, before: RigidTransform) -> FoundPose | None:
         """The pose where `camera_from_room` is nearly known."""
 
     def judged(self, found: FoundPose, seen: SeenCorners, camera: Camera, layout: CrossLayout) -> Localisation:
@@ -104,7 +102,9 @@ class CrossLocaliser(ABC):
 
     def _status(self, found: FoundPose) -> tuple[Status, str]:
         if found.second is not None:
-            apart = np.linalg.norm(found.second.inverse().translation_mm - found.camera_from_room.inverse().translation_mm)
+            apart = np.linalg.norm(
+                found.second.inverse().translation_mm - found.camera_from_room.inverse().translation_mm
+            )
             return Status.AMBIGUOUS, (
                 f"A second pose, {apart:.0f} mm away, explains the crosses as well; show the camera more of them."
             )
@@ -154,7 +154,7 @@ def _unexplained(seen: SeenCorners, layout: CrossLayout) -> Localisation:
         return Localisation(Status.BAD_INPUT, _size_sentence(size), crosses=names, corners_px=seen.pixels)
     return Localisation(
         Status.UNOBSERVABLE,
-        f"No pose explains the crosses that are seen, {_listed(names)}; check the layout, and whether one has been moved.",
+        f"No pose explains the crosses that are seen, {_listed(names)}; check the layout, and whether one was moved.",
         crosses=names,
         corners_px=seen.pixels,
     )

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from glisson.core.arrays import FloatArray, IntArray
+from glisson.core.arrays import FloatArray
 from glisson.core.camera import Camera
 from glisson.core.crosses import COLOURS, Cross, CrossLayout
 from glisson.core.transform import RigidTransform
@@ -27,10 +27,8 @@ _FLOOR_PX = 0.03
 """What paper, print and light leave of every edge, however many samples it has."""
 
 _ROBUST_FITS = 4
-_ARMS = np.array([1, 1, 0, 2, 2, 0, 3, 3, 0, 4, 4, 0])
-"""Colour of the ink at each corner's arm; the edge from a corner to the next has that of `_EDGE_ARMS`."""
-
-_EDGE_ARMS = np.array([1, 1, 2, 2, 2, 3, 3, 3, 4, 4, 4, 1])
+_EDGE_ARMS = (1, 1, 2, 2, 2, 3, 3, 3, 4, 4, 4, 1)
+"""The edge from a corner to the next bounds the ink of this one of the cross's colours."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,8 +103,10 @@ def _fitted(
 ) -> _Lines:  # fmt: skip
     """The edges from each corner of the crosses to the next."""
     first, last = places.reshape(-1, 3), np.roll(places, -1, axis=1).reshape(-1, 3)
-    colours = np.array([COLOURS.index(layout.crosses[n].colours[arm]) for n in numbers for arm in _EDGE_ARMS], dtype=np.int64)
-    pixels, normals, shares = _samples(camera, camera_from_room, first, last)
+    colours = np.array(
+        [COLOURS.index(layout.crosses[n].colours[arm]) for n in numbers for arm in _EDGE_ARMS], dtype=np.int64
+    )
+    pixels, normals = _samples(camera, camera_from_room, first, last)
     offsets = edge_offsets(
         image, pixels.reshape(-1, 2), normals.reshape(-1, 2), np.repeat(colours, _SAMPLES), reach_px
     ).reshape(-1, _SAMPLES)
@@ -118,8 +118,8 @@ def _fitted(
 
 def _samples(
     camera: Camera, camera_from_room: RigidTransform, first: FloatArray, last: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Pixels and normals (edges, samples, 2) and shares of the length (edges, samples) on edges between two corners."""
+) -> tuple[FloatArray, FloatArray]:
+    """Pixels and normals (edges, samples, 2) on edges between two corners."""
     ends = project(camera, camera_from_room, np.vstack([first, last])).reshape(2, -1, 2)
     length = np.linalg.norm(ends[1] - ends[0], axis=1)
     margin = np.minimum(_FROM_CORNER_PX / np.maximum(length, 1e-9), 0.3)[:, None]
@@ -129,7 +129,7 @@ def _samples(
     along = np.gradient(pixels, axis=1)
     along /= np.maximum(np.linalg.norm(along, axis=2, keepdims=True), 1e-12)
     # Clockwise round the ink, with v downwards, paper is on the left.
-    return pixels, np.stack([along[:, :, 1], -along[:, :, 0]], axis=2), shares
+    return pixels, np.stack([along[:, :, 1], -along[:, :, 0]], axis=2)
 
 
 def _slopes(camera_from_room: RigidTransform, places: FloatArray) -> FloatArray:
@@ -137,9 +137,7 @@ def _slopes(camera_from_room: RigidTransform, places: FloatArray) -> FloatArray:
     return np.asarray(in_camera[:, :2] / in_camera[:, 2:])
 
 
-def _lines(
-    slopes: FloatArray, there: NDArray[np.bool_], first: FloatArray, last: FloatArray, camera: Camera
-) -> _Lines:
+def _lines(slopes: FloatArray, there: NDArray[np.bool_], first: FloatArray, last: FloatArray, camera: Camera) -> _Lines:
     """Lines through samples (edges, samples, 2) beside the expected edges from `first` to `last` (edges, 2)."""
     pixel = 1.0 / float(camera.focal_px.mean())
     length = np.linalg.norm(last - first, axis=1)
@@ -157,13 +155,16 @@ def _lines(
     # Samples nearer to each other than the blur share their noise.
     shared = np.maximum(1.0, _SAMPLES * 1.5 * pixel / length)
     ends = np.stack([good & (low < _NEXT_CORNER), good & (high > 1.0 - _NEXT_CORNER)], axis=1)
-    variances = np.stack(
-        [
-            scatter**2 * shared * (1.0 / np.maximum(count, 1) + (end - middle) ** 2 / np.maximum(spread, 1e-9))
-            for end in (0.0, 1.0)
-        ],
-        axis=1,
-    ) + (_FLOOR_PX * pixel) ** 2
+    variances = (
+        np.stack(
+            [
+                scatter**2 * shared * (1.0 / np.maximum(count, 1) + (end - middle) ** 2 / np.maximum(spread, 1e-9))
+                for end in (0.0, 1.0)
+            ],
+            axis=1,
+        )
+        + (_FLOOR_PX * pixel) ** 2
+    )
     # h = level + slant · s, as a line of its own in the slopes.
     tilted = normals - (slant / length)[:, None] * along
     size = np.linalg.norm(tilted, axis=1)

@@ -1,5 +1,7 @@
 """Outlines of crosses in an image: coloured areas whose contour has the twelve corners of a cross."""
 
+from typing import Any
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +48,9 @@ def cross_outlines(image: NDArray[np.uint8]) -> list[FloatArray]:
 
 def _is_cut(corners: FloatArray, shape: tuple[int, ...]) -> bool:
     """Whether the image may end within the cross."""
-    return bool((corners < _BORDER_PX).any() or (corners > [shape[1] - 1 - _BORDER_PX, shape[0] - 1 - _BORDER_PX]).any())
+    return bool(
+        (corners < _BORDER_PX).any() or (corners > [shape[1] - 1 - _BORDER_PX, shape[0] - 1 - _BORDER_PX]).any()
+    )
 
 
 @compiled
@@ -63,7 +67,7 @@ def _coloured(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return mask
 
 
-def _twelve_corners(contour: NDArray[np.int32], area: float) -> FloatArray | None:
+def _twelve_corners(contour: Any, area: float) -> FloatArray | None:
     """The corners of a contour; None where these are not twelve in the order of a cross."""
     arm = np.sqrt(area / 5.0)
     for tolerance in (0.2, 0.3, 0.14):

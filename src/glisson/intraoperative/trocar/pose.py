@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -12,9 +13,9 @@ from glisson.core.arrays import FloatArray
 from glisson.core.camera import Camera
 from glisson.core.crosses import CrossLayout
 from glisson.core.transform import RigidTransform
-from glisson.intraoperative.cameras.projection import project_with_jacobian
 from glisson.intraoperative.trocar.corners import SeenCorners
 from glisson.intraoperative.trocar.refinement import RefinedPose, refined_pose, turn
+from glisson.intraoperative.trocar.uncertainty import loosened, pose_covariance
 
 CONFIDENCE = 0.9999
 _BOUND = float(np.sqrt(chi2.ppf(CONFIDENCE, 3)))
@@ -26,6 +27,9 @@ _CLEARLY_WORSE = 50.0
 
 _APART = 20.0
 """A second pose this far away, squared, in units of the first one's covariance, is another one."""
+
+_SOFT, _REWEIGHTED = 9.0, 4
+"""Corners with larger squared errors weigh less; so often are they weighted anew."""
 
 _GUESSES = 40
 """Pairs of crosses that are tried at most for a pose with which the others agree."""
@@ -61,21 +65,25 @@ def pose_from_corners(seen: SeenCorners, camera: Camera, layout: CrossLayout) ->
     """
     if len(seen.crosses) < 2:
         return None
-    agreed = _agreed(seen)
+    agreed = _agreed(seen, camera, layout)
     if agreed is None:
         return None
-    pose, agree = agreed
-    found = with_covariance(pose, seen, agree, camera, layout)
-    return replace(found, second=_second(pose, seen.of(agree), found))
+    found = with_covariance(agreed.pose, seen, agreed.weighted, agreed.agree, camera, layout)
+    return replace(found, second=_second(agreed.pose, agreed.weighted.of(agreed.agree), found))
 
 
 def with_covariance(
-    pose: RefinedPose, seen: SeenCorners, agree: NDArray[np.bool_], camera: Camera, layout: CrossLayout
+    pose: RefinedPose,
+    seen: SeenCorners,
+    weighted: SeenCorners,
+    agree: NDArray[np.bool_],
+    camera: Camera,
+    layout: CrossLayout,
 ) -> FoundPose:
-    """A refined pose by the corners that agree (n,), with covariance and bounds."""
+    """A refined pose by the corners that agree (n,), with covariance and bounds; `weighted` are as it took them."""
     used = seen.of(agree)
     scale = max(1.0, float(np.sqrt(pose.squares.sum() / (2 * len(used) - 6))))
-    covariance = np.linalg.inv(pose.normal) * scale**2 + _unmodelled(pose, used, camera, layout)
+    covariance = pose_covariance(pose, used, weighted.information[agree], scale, camera, layout)
     transform = RigidTransform("camera", "room", pose.rotation, pose.translation_mm, covariance)
     bound_mm, bound_rad = _bounds(transform)
     return FoundPose(transform, agree, scale, bound_mm, bound_rad)
@@ -90,36 +98,51 @@ def _bounds(camera_from_room: RigidTransform) -> tuple[float, float]:
     return float(_BOUND * place), float(_BOUND * angle)
 
 
-def _agreed(seen: SeenCorners) -> tuple[RefinedPose, NDArray[np.bool_]] | None:
-    """The pose with which most corners agree, and which these are."""
-    everything = np.ones(len(seen), dtype=bool)
-    pose = global_pose(seen)
-    if pose is not None and (pose.squares < _OFF).all():
-        return pose, everything
-    best = everything & False
+class _Agreed(NamedTuple):
+    """A pose, the corners as they were weighted, and which of them agree with it."""
+
+    pose: RefinedPose
+    weighted: SeenCorners
+    agree: NDArray[np.bool_]
+
+
+def _agreed(seen: SeenCorners, camera: Camera, layout: CrossLayout) -> _Agreed | None:
+    """The pose with which most corners agree."""
+    agreed = None
+    if (guess := global_pose(seen)) is not None:
+        agreed = _grown(loosened(seen, guess, camera, layout), guess)
+    if agreed is not None:
+        return agreed
+    best, best_count = None, 0
     for pair in _pairs(seen):
-        guess = global_pose(seen.of(np.isin(seen.cross, pair)))
-        if guess is not None:
-            agree = _squares(seen, guess) < _OFF
-            best = agree if agree.sum() > best.sum() else best
-    return _grown(seen, best)
+        if (guess := global_pose(seen.of(np.isin(seen.cross, pair)))) is not None:
+            count = int((_squares(loosened(seen, guess, camera, layout), guess) < _OFF).sum())
+            best, best_count = (guess, count) if count > best_count else (best, best_count)
+    return None if best is None else _grown(loosened(seen, best, camera, layout), best)
 
 
-def _grown(seen: SeenCorners, agree: NDArray[np.bool_]) -> tuple[RefinedPose, NDArray[np.bool_]] | None:
-    """The pose by the corners that agree, over and over until these stay the same."""
-    for _ in range(5):
-        crosses, counts = np.unique(seen.cross[agree], return_counts=True)
-        # Of most crosses that are seen at least half of the corners must agree.
-        if (counts >= 3).sum() < 2 or 2 * len(crosses) < len(seen.crosses) or 2 * agree.sum() < len(seen):
+def _grown(weighted: SeenCorners, guess: RefinedPose) -> _Agreed | None:
+    """The pose by the corners that agree, from a guess by all corners of which false ones weigh less and less."""
+    pose = guess
+    for _ in range(_REWEIGHTED):
+        # Geman and McClure's weights.
+        weights = 1.0 / (1.0 + _squares(weighted, pose) / _SOFT) ** 2
+        pose = _refined(replace(weighted, information=weighted.information * weights[:, None, None]), pose)
+    agree = _squares(weighted, pose) < _OFF
+    for _ in range(_REWEIGHTED):
+        crosses, counts = np.unique(weighted.cross[agree], return_counts=True)
+        # Most of the corners must agree, and of most of the crosses some: half of them might tell another pose.
+        if (counts >= 3).sum() < 2 or 2 * len(crosses) <= len(weighted.crosses) or 2 * agree.sum() <= len(agree):
             return None
-        pose = global_pose(seen.of(agree))
-        if pose is None:
-            return None
-        now = _squares(seen, pose) < _OFF
-        if (now == agree).all():
-            return pose, agree
-        agree = now
+        pose = _refined(weighted.of(agree), pose)
+        before, agree = agree, _squares(weighted, pose) < _OFF
+        if (agree == before).all():
+            return _Agreed(pose, weighted, agree)
     return None
+
+
+def _refined(seen: SeenCorners, pose: RefinedPose) -> RefinedPose:
+    return refined_pose(seen.points_mm, seen.slopes, seen.information, pose.rotation, pose.translation_mm)
 
 
 def _pairs(seen: SeenCorners) -> list[tuple[int, int]]:
@@ -139,10 +162,8 @@ def global_pose(seen: SeenCorners) -> RefinedPose | None:
     )
     best: RefinedPose | None = None
     for turned, shift in zip(poses[:found], shifts[:found], strict=True):
-        rotation = turn(turned.ravel())
-        pose = refined_pose(
-            seen.points_mm, seen.slopes, seen.information, rotation, shift.ravel() - rotation @ middle
-        )
+        rotation = turn(np.asarray(turned, dtype=np.float64).ravel())
+        pose = refined_pose(seen.points_mm, seen.slopes, seen.information, rotation, shift.ravel() - rotation @ middle)
         if np.isfinite(pose.squares).all() and (best is None or pose.squares.sum() < best.squares.sum()):
             best = pose
     return best
@@ -179,48 +200,8 @@ def _second(pose: RefinedPose, used: SeenCorners, found: FoundPose) -> RigidTran
         return None
     turned, _ = cv2.Rodrigues(other.rotation @ pose.rotation.T)
     step = np.concatenate([turned.ravel(), other.translation_mm - pose.translation_mm])
-    if step @ np.linalg.solve(found.camera_from_room.covariance, step) < _APART:
+    covariance = found.camera_from_room.covariance
+    if covariance is not None and step @ np.linalg.solve(covariance, step) < _APART:
         return None
-    return RigidTransform("camera", "room", other.rotation, other.translation_mm, np.linalg.inv(other.normal) * found.scale**2)
-
-
-def _unmodelled(pose: RefinedPose, used: SeenCorners, camera: Camera, layout: CrossLayout) -> FloatArray:
-    """Covariance (6, 6) that errors of the calibration and of the crosses' places leave in the pose."""
-    total = np.zeros((6, 6))
-    known = {number: layout.crosses[number].room_from_cross for number in used.crosses}
-    if camera.covariance is None and all(one.covariance is None for one in known.values()):
-        return total
-    transform = RigidTransform("camera", "room", pose.rotation, pose.translation_mm)
-    _, by_all = project_with_jacobian(camera, transform, used.points_mm)
-    focal = np.diag(camera.focal_px)
-    weights = np.linalg.solve(focal, used.information) @ np.linalg.inv(focal)  # per px²
-    gain = np.linalg.solve(pose.normal, np.einsum("npi,npq->inq", by_all[:, :, :6], weights).reshape(6, -1))
-    if camera.covariance is not None:
-        of_camera = gain @ by_all[:, :, 6:].reshape(-1, 9)
-        total += of_camera @ camera.covariance @ of_camera.T
-    for number, place in known.items():
-        if place.covariance is not None:
-            total += _of_place(pose, used, by_all, gain, number, place)
-    return total
-
-
-def _of_place(
-    pose: RefinedPose, used: SeenCorners, by_all: FloatArray, gain: FloatArray, number: int, place: RigidTransform
-) -> FloatArray:
-    """What the error of one cross's place leaves in the pose (6, 6)."""
-    rows = np.flatnonzero(used.cross == number)
-    arms = used.points_mm[rows] - place.translation_mm
-    zero = np.zeros(len(rows))
-    turned = np.stack(
-        [
-            np.stack([zero, arms[:, 2], -arms[:, 1]], axis=1),
-            np.stack([-arms[:, 2], zero, arms[:, 0]], axis=1),
-            np.stack([arms[:, 1], -arms[:, 0], zero], axis=1),
-        ],
-        axis=1,
-    )
-    moved = np.concatenate([turned, np.broadcast_to(np.eye(3), turned.shape)], axis=2)
-    by_place = by_all[rows, :, 3:6] @ (pose.rotation @ moved)
-    part = gain.reshape(6, -1, 2)[:, rows].reshape(6, -1) @ by_place.reshape(-1, 6)
-    spread: FloatArray = part @ place.covariance @ part.T
-    return spread
+    its_own = np.asarray(np.linalg.inv(other.normal) * found.scale**2, dtype=np.float64)
+    return RigidTransform("camera", "room", other.rotation, other.translation_mm, its_own)

@@ -70,7 +70,8 @@ def _is_same(colours: tuple[str, ...], code: tuple[str, ...]) -> bool:
 
 def _colours(image: NDArray[np.uint8], outline: FloatArray) -> tuple[str, ...] | None:
     """The colours of middle and arms, clockwise from the first one; None where more than one is untold, or no paper."""
-    seen_from_cross, _ = cv2.findHomography(unit_corners(), outline)
+    found, _ = cv2.findHomography(unit_corners(), outline)
+    seen_from_cross = np.asarray(found, dtype=np.float64)
     paper = np.median(_levels(image, seen_from_cross, _NOTCHES), axis=0)
     squares = _levels(image, seen_from_cross, unit_squares())
     if not np.isfinite(paper).all() or not np.isfinite(squares).all() or paper.min() < 1.0:

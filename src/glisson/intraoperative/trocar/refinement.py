@@ -39,8 +39,10 @@ def refined_pose(
     damping = 1e-6
     squares, normal, gradient = normal_equations(points, slopes, information, rotation, translation)
     for _ in range(_ITERATIONS):
+        if not np.isfinite(squares.sum()):
+            break  # something lies behind the camera, where there is no way back
         # Turns and shifts differ in size by a thousand, so the damping goes by the diagonal (Marquardt).
-        step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), -gradient)
+        step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), -gradient).astype(np.float64)
         turned = turn(step[:3]) @ rotation
         moved = translation + step[3:]
         tried, its_normal, its_gradient = normal_equations(points, slopes, information, turned, moved)
@@ -66,30 +68,33 @@ def normal_equations(
     count = len(points)
     squares = np.zeros(count)
     normal, gradient = np.zeros((6, 6)), np.zeros(6)
-    slope = np.zeros((2, 6))
+    by_u, by_v = np.zeros(6), np.zeros(6)
     for n in range(count):
-        turned = rotation @ points[n]
-        x, y, z = turned[0] + translation[0], turned[1] + translation[1], turned[2] + translation[2]
+        p, q, r = points[n, 0], points[n, 1], points[n, 2]
+        tx = rotation[0, 0] * p + rotation[0, 1] * q + rotation[0, 2] * r
+        ty = rotation[1, 0] * p + rotation[1, 1] * q + rotation[1, 2] * r
+        tz = rotation[2, 0] * p + rotation[2, 1] * q + rotation[2, 2] * r
+        z = tz + translation[2]
         if z <= 1e-6:
             squares[n] = np.inf
             continue
-        u, v = x / z, y / z
-        slope[0, 3], slope[0, 4], slope[0, 5] = 1.0 / z, 0.0, -u / z
-        slope[1, 3], slope[1, 4], slope[1, 5] = 0.0, 1.0 / z, -v / z
-        for row in range(2):
-            a, b, c = slope[row, 3], slope[row, 4], slope[row, 5]
-            slope[row, 0] = c * turned[1] - b * turned[2]
-            slope[row, 1] = a * turned[2] - c * turned[0]
-            slope[row, 2] = b * turned[0] - a * turned[1]
-        error = np.array([u - slopes[n, 0], v - slopes[n, 1]])
-        weighted = information[n] @ error
-        squares[n] = error @ weighted
+        u, v = (tx + translation[0]) / z, (ty + translation[1]) / z
+        # By a shift (a, 0, c) and (0, a, d), and by a turn about the room's origin the cross product with it.
+        a, c, d = 1.0 / z, -u / z, -v / z
+        by_u[0], by_u[1], by_u[2], by_u[3], by_u[5] = c * ty, a * tz - c * tx, -a * ty, a, c
+        by_v[0], by_v[1], by_v[2], by_v[4], by_v[5] = d * ty - a * tz, -d * tx, a * tx, a, d
+        off_u, off_v = u - slopes[n, 0], v - slopes[n, 1]
+        uu, uv, vv = information[n, 0, 0], information[n, 0, 1], information[n, 1, 1]
+        first, second = uu * off_u + uv * off_v, uv * off_u + vv * off_v
+        squares[n] = off_u * first + off_v * second
         for i in range(6):
-            gradient[i] += slope[0, i] * weighted[0] + slope[1, i] * weighted[1]
-            first = information[n, 0, 0] * slope[0, i] + information[n, 0, 1] * slope[1, i]
-            second = information[n, 1, 0] * slope[0, i] + information[n, 1, 1] * slope[1, i]
-            for j in range(6):
-                normal[i, j] += first * slope[0, j] + second * slope[1, j]
+            gradient[i] += by_u[i] * first + by_v[i] * second
+            left, right = uu * by_u[i] + uv * by_v[i], uv * by_u[i] + vv * by_v[i]
+            for j in range(i + 1):
+                normal[i, j] += left * by_u[j] + right * by_v[j]
+    for i in range(6):
+        for j in range(i):
+            normal[j, i] = normal[i, j]
     return squares, normal, gradient
 
 
@@ -101,7 +106,8 @@ def turn(vector: FloatArray) -> FloatArray:
     matrix[0, 1], matrix[0, 2], matrix[1, 2] = -vector[2], vector[1], -vector[0]
     matrix = matrix - matrix.T
     if angle < 1e-8:
-        return np.eye(3) + matrix + 0.5 * matrix @ matrix
-    return (
+        return np.eye(3) + matrix
+    rotation: FloatArray = (
         np.eye(3) + np.sin(angle) / angle * matrix + (1.0 - np.cos(angle)) / angle**2 * matrix @ matrix
     )
+    return rotation

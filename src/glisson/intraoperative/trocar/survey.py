@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from glisson.core.arrays import FloatArray
 from glisson.core.camera import Camera
 from glisson.core.crosses import CrossLayout
 from glisson.core.errors import BadInput, StageFailed

@@ -114,7 +114,9 @@ def _burn(colour: FloatArray, place: FloatArray, random: np.random.Generator) ->
     x, y = (across - middle[0]) * TEXEL_MM, (down - middle[1]) * TEXEL_MM
     angle = np.arctan2(y, x)
     # No first harmonic: the spot's middle stays where it was asked for.
-    shape = 1.0 + 0.10 * np.cos(2.0 * angle + random.uniform(0, 6.3)) + 0.06 * np.cos(3.0 * angle + random.uniform(0, 6))
+    shape = (
+        1.0 + 0.10 * np.cos(2.0 * angle + random.uniform(0, 6.3)) + 0.06 * np.cos(3.0 * angle + random.uniform(0, 6))
+    )
     away = np.hypot(x, y) / (radius * shape)
     spot, rim = _edge(away, 1.0), _edge(away, 1.5) - _edge(away, 1.0)
     part = colour[low[1] : high[1], low[0] : high[0]]
