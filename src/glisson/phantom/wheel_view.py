@@ -29,10 +29,15 @@ class WheelViews:
         self.camera = camera
         self._slopes = sensor_slopes(camera)
 
-    def view(self, scene: WheelScene) -> NDArray[np.uint8]:
-        """The picture [row, column, red green blue]."""
+    def view(self, scene: WheelScene, behind: FloatArray | None = None) -> NDArray[np.uint8]:
+        """The picture [row, column, red green blue].
+
+        Args:
+            scene: the instrument, and what lies over it.
+            behind: the light (rows, columns, 3) of what is behind, such as a room; None: a ceiling out of focus.
+        """
         rng = np.random.default_rng(scene.seed)
-        light = _behind(self.camera, rng)
+        light = _ceiling(self.camera, rng) if behind is None else behind.copy()
         pose, radius = scene.trocar_from_instrument, 0.5 * scene.instrument.wheel_mm
         inks = np.array([PRINTED[name] for name in scene.instrument.colours])
         lit = np.concatenate([scene.light, scene.slope])
@@ -61,7 +66,7 @@ def _spot_rows(spots: tuple[Spot, ...]) -> FloatArray:
     return np.array([(one.x, one.y, one.radius, one.strength) for one in spots], dtype=np.float64).reshape(-1, 4)
 
 
-def _behind(camera: Camera, rng: np.random.Generator) -> FloatArray:
+def _ceiling(camera: Camera, rng: np.random.Generator) -> FloatArray:
     """A ceiling out of focus, with lamps, and with drapes and other things of all colours."""
     high, wide = -(-camera.height // _COARSE), -(-camera.width // _COARSE)
     rough = 0.45 + 0.25 * rng.standard_normal((6, 8, 1)) + 0.08 * rng.standard_normal((6, 8, 3))
