@@ -14,16 +14,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glisson.core.arrays import FloatArray
+from glisson.core.camera import Camera
+from glisson.core.crosses import CrossLayout
 from glisson.core.deformation import Deformation
 from glisson.core.fine_zone import FineZone
 from glisson.core.image import LabelMap, Volume
+from glisson.core.instruments import InstrumentLibrary, SeenInstrument
 from glisson.core.landmarks import Landmarks
+from glisson.core.localisation import Localisation
 from glisson.core.mesh import TetMesh, TriangleSurface
 from glisson.core.model import Material, Model
 from glisson.core.observations import Observations
 from glisson.core.scenario import Scenario
 from glisson.core.structures import VesselTree
 from glisson.core.transform import RigidTransform
+from glisson.core.trocar import Trocar
 
 
 class Progress(Protocol):
@@ -211,11 +216,29 @@ class SurfaceReconstructor(Technique, Protocol):
 
 
 class Localiser(Technique, Protocol):
-    """Finds the pose of a camera or tool (entry-point group `glisson.localisers`)."""
+    """Finds where a trocar is from an image of its camera (entry-point group `glisson.localisers`)."""
 
-    def localise(self, image: NDArray[np.uint8]) -> RigidTransform:
-        """Pose with covariance from an image (h, w, 3).
+    def localise(self, image: NDArray[np.uint8], camera: Camera, layout: CrossLayout) -> Localisation:
+        """The pose of the trocar in the room; what stands against it is told by the status.
+
+        Args:
+            image: [row, column, red green blue].
+            camera: has taken it.
+            layout: crosses that hang in the room.
 
         Raises:
-            StageFailed: no pose, or an ambiguous one.
+            BadInput: the image has another size than the camera's.
+        """
+
+
+class InstrumentRecogniser(Technique, Protocol):
+    """Tells which instrument is in a trocar, and where (entry-point group `glisson.instrument_recognisers`)."""
+
+    def recognise(self, image: NDArray[np.uint8], trocar: Trocar, library: InstrumentLibrary) -> SeenInstrument:
+        """The instrument in an image (h, w, 3) of the trocar's camera.
+
+        Raises:
+            BadInput: the image is not of the camera's size.
+            StageFailed: none is seen (unobservable), which one or where is in doubt (ambiguous), or what is seen
+                cannot be: a code that is not in the library, a mirrored image, a wheel of another size (bad_input).
         """

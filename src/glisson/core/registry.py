@@ -11,6 +11,7 @@ from typing import Any
 from glisson.core.errors import BadInput
 from glisson.core.parameters import build_parameters
 from glisson.core.protocols import (
+    InstrumentRecogniser,
     Localiser,
     MaterialLaw,
     Mesher,
@@ -36,6 +37,7 @@ KINDS: dict[str, tuple[str, type[Any]]] = {
     "registration": ("glisson.registrations", Registration),
     "surface-reconstructor": ("glisson.surface_reconstructors", SurfaceReconstructor),
     "localiser": ("glisson.localisers", Localiser),
+    "instrument-recogniser": ("glisson.instrument_recognisers", InstrumentRecogniser),
 }
 """Kind of technique → entry-point group and protocol."""
 

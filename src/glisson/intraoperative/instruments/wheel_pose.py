@@ -1,0 +1,146 @@
+"""The pose of a wheel from its rims, and what the trocar's pivot says to it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from glisson.core.arrays import FloatArray
+from glisson.core.camera import Camera
+from glisson.core.errors import StageFailed
+from glisson.core.status import Status
+from glisson.core.transform import RigidTransform, cross_matrix
+from glisson.core.trocar import Trocar
+from glisson.intraoperative.cameras.projection import project_with_jacobian
+from glisson.intraoperative.instruments.rim_edges import ANGLES, RimEdges
+
+ROLL_RAD = 0.02
+"""Standard deviation of the turn about the axis, which the rims do not tell."""
+
+LEAST_SHARE = 0.25
+"""A pose needs edges at so many of the points of the circles."""
+
+_STEPS = 12
+_WINDOWS = (0.12, 0.07, 0.05, 0.035)
+"""How far edges are looked for after each step, in wheel radii."""
+_LEAST_NOISE_PX = 0.03
+_INDEPENDENT = 0.2
+"""Of neighbouring edges this share tells something new: blur and the pixel grid shift them together."""
+_TUKEY = 4.0
+
+EdgeFinder = Callable[[RigidTransform, float], RimEdges]
+"""Edges near a pose within a window."""
+
+
+@dataclass(frozen=True, eq=False)
+class WheelPose:
+    """A pose `trocar_from_instrument` with covariance, and the edges on which it rests."""
+
+    pose: RigidTransform
+    edges: RimEdges
+    noise_px: float
+
+    def misfit(self, noise_px: float, trocar: Trocar) -> float:
+        """Squared residuals of all edges, at this noise, and of the pivot."""
+        off, _ = past_pivot(self.pose, trocar)
+        count = _INDEPENDENT * len(self.edges.off_px)
+        return count * (self.noise_px / noise_px) ** 2 + float(off @ off) / trocar.play_mm**2
+
+    def point(self, point_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """A point (3,) of the instrument in the frame "trocar", and its covariance (3, 3)."""
+        return self.pose.apply(point_mm), self.pose.point_covariance(point_mm)
+
+
+def fitted_pose(
+    camera: Camera, start: RigidTransform, radius_mm: float, find: EdgeFinder, trocar: Trocar | None = None
+) -> WheelPose:
+    """The pose that brings the circles of a wheel onto the edges; with a trocar its axis passes the pivot, too.
+
+    The covariance has the noise of the edges, the pivot's play and, where it is known, the camera's covariance.
+
+    Args:
+        camera: the trocar's.
+        start: a pose near it, `trocar_from_instrument`.
+        radius_mm: the wheel's radius.
+        find: gives the edges near a pose.
+        trocar: whose pivot and play are observations like any other; None: edges alone.
+
+    Raises:
+        StageFailed: too few edges, as where most of the wheel is hidden.
+    """
+    pose = start
+    for step in range(_STEPS):
+        edges = find(pose, _WINDOWS[min(step, len(_WINDOWS) - 1)])
+        if edges.share < LEAST_SHARE:
+            raise StageFailed("Too little of the wheel's rims can be seen.", Status.UNOBSERVABLE)
+        system = _System.of(camera, pose, radius_mm, edges, trocar)
+        change = np.asarray(np.linalg.solve(system.information, system.pull), dtype=np.float64)
+        pose = moved(pose, change)
+        if step >= len(_WINDOWS) and np.abs(change).max() < 1e-5:
+            break
+    inverse = np.asarray(np.linalg.inv(system.information), dtype=np.float64)
+    covariance = inverse
+    if camera.covariance is not None:
+        by_camera = inverse @ system.by_camera
+        covariance = inverse + by_camera @ camera.covariance @ by_camera.T
+    known = RigidTransform(pose.target, pose.source, pose.rotation, pose.translation_mm, covariance)
+    return WheelPose(known, edges, system.noise_px)
+
+
+def past_pivot(pose: RigidTransform, trocar: Trocar) -> tuple[FloatArray, FloatArray]:
+    """How far (2,) an axis passes the pivot by, along its x and y, and the derivative (2, 6) by d and e."""
+    x, y = pose.rotation[:, 0], pose.rotation[:, 1]
+    away = trocar.pivot_mm - pose.translation_mm
+    off = np.array([x @ away, y @ away])
+    return off, np.stack([np.concatenate([np.cross(one, away), -one]) for one in (x, y)])
+
+
+def disagreement(found: WheelPose, trocar: Trocar) -> float:
+    """Squared Mahalanobis distance (2 degrees of freedom) of the axis, as the rims have it, from the pivot."""
+    off, jacobian = past_pivot(found.pose, trocar)
+    assert found.pose.covariance is not None
+    spread = jacobian @ found.pose.covariance @ jacobian.T + trocar.play_mm**2 * np.eye(2)
+    return float(off @ np.linalg.solve(spread, off))
+
+
+def moved(pose: RigidTransform, change: FloatArray) -> RigidTransform:
+    """A pose after a small turn d and shift e (6,)."""
+    angle = float(np.linalg.norm(change[:3]))
+    turn = np.eye(3)
+    if angle > 0.0:
+        k = cross_matrix(change[:3] / angle)
+        turn = np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * k @ k
+    return RigidTransform(pose.target, pose.source, turn @ pose.rotation, pose.translation_mm + change[3:])
+
+
+@dataclass(frozen=True, eq=False)
+class _System:
+    """Normal equations of one step: information (6, 6), pull (6,), and by how the camera errs (6, 9)."""
+
+    information: FloatArray
+    pull: FloatArray
+    by_camera: FloatArray
+    noise_px: float
+
+    @classmethod
+    def of(
+        cls, camera: Camera, pose: RigidTransform, radius_mm: float, edges: RimEdges, trocar: Trocar | None
+    ) -> "_System":
+        _, jacobian = project_with_jacobian(camera, pose, edges.points * radius_mm)
+        rows = np.einsum("ni,nij->nj", edges.normals, jacobian)
+        noise = max(1.4826 * float(np.median(np.abs(edges.off_px))), _LEAST_NOISE_PX)
+        weights = (1.0 - np.minimum(np.abs(edges.off_px) / (_TUKEY * noise), 1.0) ** 2) ** 2
+        kept = weights > 0.0
+        noise = max(float(np.sqrt(np.average(edges.off_px[kept] ** 2, weights=weights[kept]))), _LEAST_NOISE_PX)
+        # Wheels that are small in the image have fewer pixels on a circle than there are edges asked for.
+        around = np.linalg.norm(np.ptp(edges.predicted_px, axis=0)) * np.pi / np.sqrt(2.0)
+        shared = _INDEPENDENT * min(1.0, around / ANGLES) / noise**2
+        weighted = rows[:, :6] * (weights * shared)[:, None]
+        axis = np.concatenate([pose.rotation[:, 2], np.zeros(3)])
+        information = weighted.T @ rows[:, :6] + np.outer(axis, axis) / ROLL_RAD**2
+        pull = weighted.T @ edges.off_px
+        if trocar is not None:
+            off, by_pose = past_pivot(pose, trocar)
+            information += by_pose.T @ by_pose / trocar.play_mm**2
+            pull -= by_pose.T @ off / trocar.play_mm**2
+        return cls(information, pull, weighted.T @ rows[:, 6:15], noise)

@@ -1,0 +1,1 @@
+"""The study of trocar poses (dissertation, section 5.2)."""
