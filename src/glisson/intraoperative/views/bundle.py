@@ -1,0 +1,159 @@
+"""Joint adjustment of scope poses, touched point, roll and hand–eye, over two or more views."""
+
+from typing import ClassVar
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
+
+from glisson.core.arrays import FloatArray
+from glisson.core.errors import StageFailed
+from glisson.core.observations import Observations
+from glisson.core.protocols import Progress, Reconstruction, silent
+from glisson.core.status import Status
+from glisson.core.transform import RigidTransform
+from glisson.core.views import Sightings, ViewSet
+from glisson.intraoperative.cameras.projection import directions
+from glisson.intraoperative.views.adjustment import Problem, Solution, State, solve
+from glisson.intraoperative.views.contradictions import contradictions
+from glisson.intraoperative.views.epipolar import epipolar_statistics
+from glisson.intraoperative.views.outcome import landmark_observations, observation
+from glisson.intraoperative.views.parallax import judged, parallax_rad, require_parallax
+from glisson.intraoperative.views.parameters import ReconstructionParameters
+
+_GATE = float(chi2.isf(1e-4, 1))
+_MOST_REFUSED = 0.5
+"""Where the poses refuse more of the features, either is wrong, and no feature can be relied on."""
+
+_CUT = 3.0
+_UNKNOWN_ROLL_RAD = 0.2
+"""A roll that is known no better is first taken from the touched point."""
+
+
+class Bundle:
+    """Least squares of what was measured, weighted by its covariance; features over the whole image tie the views."""
+
+    name: ClassVar[str] = "bundle"
+    summary: ClassVar[str] = "Joint adjustment of poses, touched point, roll and hand-eye over two or more views."
+    Parameters: ClassVar[type[ReconstructionParameters]] = ReconstructionParameters
+
+    def __init__(self, parameters: ReconstructionParameters) -> None:
+        self._parameters = parameters
+
+    @classmethod
+    def missing_dependencies(cls) -> tuple[str, ...]:
+        """Nothing beyond Glisson's own dependencies."""
+        return ()
+
+    def reconstruct(self, views: ViewSet, progress: Progress = silent) -> Reconstruction:
+        """Reconstruct landmarks and features; see `glisson.core.protocols.SurfaceReconstructor`."""
+        require_parallax(views, self._parameters.worst_mm)
+        features, refused = _credible(views)
+        problem = _problem(views, features)
+        try:
+            solution = solve(problem, _start(views, problem))
+        except np.linalg.LinAlgError as error:
+            raise StageFailed("The views leave a point's place open; move farther.", Status.UNOBSERVABLE) from error
+        centres, points = solution.state.centres_mm, solution.state.points_mm
+        angle = float(np.median(parallax_rad(centres, points[1:] if len(points) > 1 else points)))
+        notes = judged(solution.of_points, angle, self._parameters.worst_mm, self._parameters.doubtful_mm)
+        wrong = contradictions(problem, solution, [view.name for view in views.views], views.names)
+        if refused > _MOST_REFUSED * views.features.count:
+            wrong += (
+                f"{refused} of {views.features.count} features contradict the measured poses; the tissue moved between "
+                "the views, or the poses are wrong. No feature was used.",
+            )
+        status = Status.AMBIGUOUS if wrong else Status.CONVERGED
+        return Reconstruction(Observations(_observed(views, solution)), status, wrong + notes, angle)
+
+
+def _credible(views: ViewSet) -> tuple[Sightings, int]:
+    """Features that all pairs of their views allow, numbered anew, and how many were refused."""
+    seen, bad = views.features, np.zeros(views.features.count, dtype=bool)
+    for first in range(len(views.views)):
+        for second in range(first + 1, len(views.views)):
+            one, two = (np.flatnonzero(seen.view == number) for number in (first, second))
+            _, left, right = np.intersect1d(seen.point[one], seen.point[two], return_indices=True)
+            pixels = (seen.pixels[one[left]], seen.pixels[two[right]])
+            pair = views.views[first], views.views[second]
+            missed = epipolar_statistics(*pair, pixels, seen.sigma_px, views.hand_eye_covariance) > _GATE
+            bad[seen.point[one[left]][missed]] = True
+    refused = int(bad.sum())
+    keep = ~bad[seen.point]
+    if refused > _MOST_REFUSED * views.features.count or not keep.any():
+        return Sightings.none(), refused
+    numbers = np.unique(seen.point[keep], return_inverse=True)[1]
+    return Sightings(numbers, seen.view[keep], seen.pixels[keep], seen.sigma_px), refused
+
+
+def _problem(views: ViewSet, features: Sightings) -> Problem:
+    """Point 0 is the touched one, then come landmarks and features."""
+    count, landmarks = len(views.views), views.landmarks
+    given = count + len(landmarks.point)
+    return Problem(
+        cameras=tuple(view.camera for view in views.views),
+        poses=tuple(view.room_from_camera for view in views.views),
+        hand_eye_covariance=views.hand_eye_covariance,
+        point=np.concatenate([np.zeros(count, int), 1 + landmarks.point, 1 + len(views.names) + features.point]),
+        view=np.concatenate([np.arange(count), landmarks.view, features.view]),
+        pixels=np.concatenate([[view.tip_px for view in views.views], landmarks.pixels, features.pixels]),
+        sigma_px=np.concatenate(
+            [
+                np.full(count, views.tip_sigma_px),
+                np.full(len(landmarks.point), landmarks.sigma_px),
+                np.full(len(features.point), features.sigma_px),
+            ]
+        ),
+        # What a person gave is never silently set aside; it is flagged.
+        cut=np.concatenate([np.full(given, np.inf), np.full(len(features.point), _CUT)]),
+        known_mm=views.touched_mm,
+        known_covariance_mm2=views.touched_covariance_mm2,
+    )
+
+
+def _start(views: ViewSet, problem: Problem) -> State:
+    """Poses as measured, and every point as far before the first scope that sees it as the touched one."""
+    poses = [_rolled(views, number) for number in range(len(views.views))]
+    rotations = np.stack([pose.rotation for pose in poses])
+    centres = np.stack([pose.translation_mm for pose in poses])
+    _, first = np.unique(problem.point, return_index=True)
+    points = np.tile(views.touched_mm, (len(first), 1))
+    for number, view in enumerate(views.views):
+        rows = first[problem.view[first] == number]
+        if not len(rows):
+            continue
+        rays = directions(view.camera, problem.pixels[rows]) @ rotations[number].T
+        depth = max(float((views.touched_mm - centres[number]) @ rotations[number][:, 2]), 10.0)
+        points[problem.point[rows]] = centres[number] + depth * rays / (rays @ rotations[number][:, 2])[:, None]
+    points[0] = views.touched_mm
+    return State(rotations, centres, np.zeros(6), points)
+
+
+def _rolled(views: ViewSet, number: int) -> RigidTransform:
+    """The measured pose; where its roll is as good as unknown, turned until the touched point is where it is seen."""
+    view = views.views[number]
+    pose = view.room_from_camera
+    assert pose.covariance is not None  # a view has one
+    axis = pose.rotation[:, 2]
+    if axis @ pose.covariance[:3, :3] @ axis < _UNKNOWN_ROLL_RAD**2:
+        return pose
+    to = (views.touched_mm - pose.translation_mm) @ pose.rotation
+    seen = directions(view.camera, view.tip_px[None])[0]
+    roll = float(np.arctan2(to[1], to[0]) - np.arctan2(seen[1], seen[0]))
+    turned = pose.rotation @ Rotation.from_rotvec([0.0, 0.0, roll]).as_matrix()
+    return RigidTransform(pose.target, pose.source, turned, pose.translation_mm, pose.covariance)
+
+
+def _observed(views: ViewSet, solution: Solution) -> tuple:  # type: ignore[type-arg]
+    points, covariance = solution.state.points_mm, _even(solution.of_points)
+    named = slice(1, 1 + len(views.names))
+    found = landmark_observations(views.names, points[named], covariance[named])
+    found += (observation("surface", "touched point", points[:1], covariance[:1]),)
+    if len(points) > named.stop:
+        found += (observation("surface", "features", points[named.stop :], covariance[named.stop :]),)
+    return found
+
+
+def _even(matrices: FloatArray) -> FloatArray:
+    even: FloatArray = 0.5 * (matrices + np.swapaxes(matrices, 1, 2))
+    return even
