@@ -13,11 +13,11 @@ from glisson.phantom.half_sphere_box import (
     CAMERA,
     LANDMARKS_MM,
     TOUCHED_MM,
-    ScopePlace,
     drawn_features,
     pixels_of,
     scope_place,
 )
+from glisson.phantom.laparoscope_view import Place
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class ViewNoise:
     touched_mm: float
     tip_px: float = 1.0
     landmark_px: float = 0.5
-    feature_px: float = 0.3
+    feature_px: float = 0.2
 
     def times(self, factor: float) -> "ViewNoise":
         """The same with poses and touched point so many times as noisy; pixels are what they are."""
@@ -69,7 +69,7 @@ def measured_views(
     )
 
 
-def measured_pose(place: ScopePlace, noise: ViewNoise, rng: np.random.Generator) -> RigidTransform:
+def measured_pose(place: Place, noise: ViewNoise, rng: np.random.Generator) -> RigidTransform:
     """`room_from_camera` as it is measured, with its covariance."""
     angles = np.radians([noise.direction_deg, noise.direction_deg, noise.roll_deg])
     turn = place.rotation @ (angles * rng.standard_normal(3))
@@ -103,14 +103,12 @@ def _displaced(seen: Sightings, share: float) -> Sightings:
     return Sightings(seen.point, seen.view, seen.pixels * factors[:, None], seen.sigma_px)
 
 
-def _view(number: int, place: ScopePlace, noise: ViewNoise, rng: np.random.Generator) -> View:
+def _view(number: int, place: Place, noise: ViewNoise, rng: np.random.Generator) -> View:
     tip = pixels_of(place, TOUCHED_MM[None])[0] + noise.tip_px * rng.standard_normal(2)
     return View(f"view {number}", CAMERA, measured_pose(place, noise, rng), tip)
 
 
-def _sightings(
-    places: Sequence[ScopePlace], points_mm: FloatArray, sigma_px: float, rng: np.random.Generator
-) -> Sightings:
+def _sightings(places: Sequence[Place], points_mm: FloatArray, sigma_px: float, rng: np.random.Generator) -> Sightings:
     pixels = np.concatenate([pixels_of(place, points_mm) for place in places])
     return Sightings(
         np.tile(np.arange(len(points_mm)), len(places)),

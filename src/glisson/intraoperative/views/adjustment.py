@@ -20,6 +20,9 @@ _STEPS = 60
 _SMALL = 1e-3
 """A step of less than so many standard deviations is no step."""
 
+_NO_GAIN = 1e-4
+"""A fall of χ² that means nothing."""
+
 _IDENTITY = RigidTransform("camera", "camera", np.eye(3), np.zeros(3))
 
 
@@ -106,8 +109,9 @@ def solve(problem: Problem, state: State) -> Solution:
         moved, size = normal.step(state, damping)
         tried = _linearised(problem, moved)
         if tried.cost <= at.cost + 1e-9:
+            gain = at.cost - tried.cost
             state, at, damping = moved, tried, max(damping / 10.0, 1e-9)
-            if size < _SMALL:
+            if size < _SMALL or gain < _NO_GAIN:
                 return _solution(problem, state, at)
         else:
             damping *= 10.0

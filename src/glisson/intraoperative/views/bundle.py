@@ -3,6 +3,7 @@
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
@@ -25,7 +26,9 @@ _GATE = float(chi2.isf(1e-4, 1))
 _MOST_REFUSED = 0.5
 """Where the poses refuse more of the features, either is wrong, and no feature can be relied on."""
 
-_CUT = 3.0
+_CUT, _FAR = 3.0, 5.0
+"""Features count less beyond the first, and not at all beyond the second, in standard deviations."""
+
 _UNKNOWN_ROLL_RAD = 0.2
 """A roll that is known no better is first taken from the touched point."""
 
@@ -49,9 +52,8 @@ class Bundle:
         """Reconstruct landmarks and features; see `glisson.core.protocols.SurfaceReconstructor`."""
         require_parallax(views, self._parameters.worst_mm)
         features, refused = _credible(views)
-        problem = _problem(views, features)
         try:
-            solution = solve(problem, _start(views, problem))
+            problem, solution = _solved(views, features)
         except np.linalg.LinAlgError as error:
             raise StageFailed("The views leave a point's place open; move farther.", Status.UNOBSERVABLE) from error
         centres, points = solution.state.centres_mm, solution.state.points_mm
@@ -67,6 +69,19 @@ class Bundle:
         return Reconstruction(Observations(_observed(views, solution)), status, wrong + notes, angle)
 
 
+def _solved(views: ViewSet, features: Sightings) -> tuple[Problem, Solution]:
+    """The adjustment, once more without the features that it leaves far from where they are seen."""
+    problem = _problem(views, features)
+    solution = solve(problem, _start(views, problem))
+    far = (np.linalg.norm(solution.at.seen, axis=1) > _FAR)[len(problem.point) - len(features.point) :]
+    if not far.any():
+        return problem, solution
+    bad = np.zeros(features.count, dtype=bool)
+    bad[features.point[far]] = True
+    problem = _problem(views, _without(features, bad))
+    return problem, solve(problem, _start(views, problem))
+
+
 def _credible(views: ViewSet) -> tuple[Sightings, int]:
     """Features that all pairs of their views allow, numbered anew, and how many were refused."""
     seen, bad = views.features, np.zeros(views.features.count, dtype=bool)
@@ -79,11 +94,16 @@ def _credible(views: ViewSet) -> tuple[Sightings, int]:
             missed = epipolar_statistics(*pair, pixels, seen.sigma_px, views.hand_eye_covariance) > _GATE
             bad[seen.point[one[left]][missed]] = True
     refused = int(bad.sum())
+    if refused > _MOST_REFUSED * len(bad):
+        bad[:] = True
+    return _without(seen, bad), refused
+
+
+def _without(seen: Sightings, bad: NDArray[np.bool_]) -> Sightings:
+    """The sightings of points that are not bad (m,), numbered anew."""
     keep = ~bad[seen.point]
-    if refused > _MOST_REFUSED * views.features.count or not keep.any():
-        return Sightings.none(), refused
     numbers = np.unique(seen.point[keep], return_inverse=True)[1]
-    return Sightings(numbers, seen.view[keep], seen.pixels[keep], seen.sigma_px), refused
+    return Sightings(numbers.astype(np.int64), seen.view[keep], seen.pixels[keep], seen.sigma_px)
 
 
 def _problem(views: ViewSet, features: Sightings) -> Problem:
