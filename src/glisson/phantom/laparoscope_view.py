@@ -83,7 +83,8 @@ def picture_through(
 def _lit(colours: FloatArray, rays: FloatArray, normals: FloatArray, distance: FloatArray, glare: float) -> FloatArray:
     facing = np.clip(-(rays * normals).sum(axis=1), 0.0, 1.0)
     diffuse = (_AMBIENT + (1.0 - _AMBIENT) * facing) / distance**2
-    return colours * diffuse[:, None] + glare * facing[:, None] ** _GLARE_SHARPNESS
+    light: FloatArray = colours * diffuse[:, None] + glare * facing[:, None] ** _GLARE_SHARPNESS
+    return light
 
 
 def _tool_hits(tool: Tool, origin: FloatArray, rays: FloatArray) -> tuple[FloatArray, FloatArray]:

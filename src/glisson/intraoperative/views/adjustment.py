@@ -20,7 +20,7 @@ _STEPS = 60
 _SMALL = 1e-3
 """A step of less than so many standard deviations is no step."""
 
-_NO_GAIN = 1e-4
+_NO_GAIN = 1e-3
 """A fall of χ² that means nothing."""
 
 _IDENTITY = RigidTransform("camera", "camera", np.eye(3), np.zeros(3))

@@ -1,6 +1,7 @@
 """Points of the surface that are found in several pictures without a person's help."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -40,8 +41,8 @@ def match_features(
         hand_eye: (6, 6) as in `ViewSet`.
     """
     grey = [np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), dtype=np.uint8) for image in images]
-    sift = cv2.SIFT_create(_DETECTED)
-    found = [_Found(*sift.detectAndCompute(image, _usable(image))) for image in grey]
+    sift = cv2.SIFT.create(_DETECTED)
+    found = [_found(sift, image) for image in grey]
     first = found[0].places
     matched = np.full((len(images), len(first), 2), np.nan)
     matched[0] = first
@@ -56,13 +57,22 @@ def match_features(
     return _sightings(matched, found[0].strengths)
 
 
+@dataclass(frozen=True, eq=False)
 class _Found:
     """Features of a picture: places (n, 2), strengths (n,) and descriptors (n, 128)."""
 
-    def __init__(self, keys: Sequence[cv2.KeyPoint], descriptors: NDArray[np.float32] | None) -> None:
-        self.places = np.array([key.pt for key in keys], dtype=np.float64).reshape(-1, 2)
-        self.strengths = np.array([key.response for key in keys], dtype=np.float64)
-        self.descriptors = np.zeros((0, 128), dtype=np.float32) if descriptors is None else descriptors
+    places: FloatArray
+    strengths: FloatArray
+    descriptors: NDArray[np.float32]
+
+
+def _found(sift: cv2.SIFT, grey: NDArray[np.uint8]) -> _Found:
+    keys, descriptors = sift.detectAndCompute(grey, _usable(grey))
+    return _Found(
+        np.array([key.pt for key in keys], dtype=np.float64).reshape(-1, 2),
+        np.array([key.response for key in keys], dtype=np.float64),
+        np.asarray(descriptors if len(keys) else np.zeros((0, 128)), dtype=np.float32),
+    )
 
 
 def _usable(grey: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -110,9 +120,10 @@ def _refined(
     criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 1e-3)
     for row, (place, guess) in enumerate(zip(places.tolist(), guesses.tolist(), strict=True)):
         patch, about = cv2.getRectSubPix(one, (whole, whole), place), cv2.getRectSubPix(two, (reach, reach), guess)
+        everywhere = np.ones((reach, reach), dtype=np.uint8)
         start = np.array([[1.0, 0.0, _MARGIN], [0.0, 1.0, _MARGIN]], dtype=np.float32)
         try:
-            likeness, warp = cv2.findTransformECC(patch, about, start, cv2.MOTION_AFFINE, criteria)
+            likeness, warp = cv2.findTransformECC(patch, about, start, cv2.MOTION_AFFINE, criteria, everywhere, 1)
         except cv2.error:  # it ran out of the picture
             continue
         moved = warp @ np.array([_HALF, _HALF, 1.0]) - (_HALF + _MARGIN)

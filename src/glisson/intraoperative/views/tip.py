@@ -41,8 +41,8 @@ def _candidates(image: NDArray[np.uint8]) -> list[NDArray[np.bool_]]:
     smooth = cv2.GaussianBlur(image, (0, 0), 2.0)
     colours = cv2.cvtColor(smooth, cv2.COLOR_RGB2HSV)
     grey = ((colours[..., 1] <= _GREYEST) & (colours[..., 2] >= _DARKEST)).astype(np.uint8)
-    grey = cv2.morphologyEx(grey, cv2.MORPH_OPEN, np.ones((5, 5), np.uint8))
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(grey)
+    opened = cv2.morphologyEx(grey, cv2.MORPH_OPEN, np.ones((5, 5), np.uint8))
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(opened)
     large = [row for row in range(1, count) if stats[row, cv2.CC_STAT_AREA] > _LEAST_SHARE * grey.size]
     return [labels == row for row in large]
 
