@@ -31,7 +31,8 @@ from glisson.studies.surface.tasks import NO_LIMIT, PAIRS, scored
 
 PIXELS = Task(
     f"{__name__}:from_pixels",
-    ("glisson.core", "glisson.intraoperative.cameras.projection", "glisson.intraoperative.views", "glisson.phantom.half_sphere_box", "glisson.phantom.laparoscope_view",
+    ("glisson.core", "glisson.intraoperative.cameras.projection", "glisson.intraoperative.views",
+     "glisson.phantom.half_sphere_box", "glisson.phantom.laparoscope_view",
      "glisson.phantom.measured_views", "glisson.phantom.optics", "glisson.phantom.photograph",
      "glisson.phantom.texture", "glisson.studies.surface.tasks", __name__),
 )  # fmt: skip
@@ -93,4 +94,5 @@ def _feature_errors(features: Sightings, places: tuple[Place, Place], box: HalfS
     rays = np.concatenate([slopes, np.ones((len(slopes), 1))], axis=1)
     rays = rays / np.linalg.norm(rays, axis=1, keepdims=True) @ places[0].rotation.T
     far, _ = box.hits(places[0].centre_mm, rays)
-    return second - pixels_of(places[1], places[0].centre_mm + far[:, None] * rays)
+    off: FloatArray = second - pixels_of(places[1], places[0].centre_mm + far[:, None] * rays)
+    return off

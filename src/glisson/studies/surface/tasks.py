@@ -20,7 +20,8 @@ from glisson.studies.point import Outcome, Task
 from glisson.studies.surface.printed import PRINTED_MM
 
 _PACKAGES = (
-    "glisson.core", "glisson.intraoperative.cameras.projection", "glisson.intraoperative.views", "glisson.phantom.half_sphere_box", "glisson.phantom.laparoscope_view",
+    "glisson.core", "glisson.intraoperative.cameras.projection", "glisson.intraoperative.views",
+    "glisson.phantom.half_sphere_box", "glisson.phantom.laparoscope_view",
     "glisson.phantom.measured_views", "glisson.phantom.optics", "glisson.studies.surface.printed", __name__,
 )  # fmt: skip
 

@@ -28,8 +28,8 @@ def as_lines(values: Mapping[str, Any]) -> list[str]:
         if row["joint_mm"] is not None:
             lines.append(
                 f"rendered  {name:18} joint {_spread(row['joint_mm'])} over {row['draws']} draws; "
-                f"{row['features']:.0f} features, {row['feature_px']:.2f} px off, {100.0 * row['feature_outliers']:.0f} % of them more than "
-                f"1 px; tip {row['tip_px']:.1f} px off"
+                f"{row['features']:.0f} features, {row['feature_px']:.2f} px off, "
+                f"{100.0 * row['feature_outliers']:.0f} % of them more than 1 px; tip {row['tip_px']:.1f} px off"
             )
         lines += [f"rendered  {name:18} {message}" for message in row["messages"]]
     lines += [f"failed    {message}" for message in values["failed"]]
