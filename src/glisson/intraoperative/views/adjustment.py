@@ -20,7 +20,7 @@ _STEPS = 60
 _SMALL = 1e-3
 """A step of less than so many standard deviations is no step."""
 
-_NO_GAIN = 1e-3
+_NO_GAIN = 1e-2
 """A fall of χ² that means nothing."""
 
 _IDENTITY = RigidTransform("camera", "camera", np.eye(3), np.zeros(3))
@@ -38,8 +38,8 @@ class Problem:
         pixels: (n, 2) where.
         sigma_px: (n,).
         cut: (n,) residuals beyond so many standard deviations count less (Huber 1964); infinite: never.
-        known_mm: (3,) of point 0.
-        known_covariance_mm2: (3, 3) of it.
+        known_mm: (m, 3) where the points are beforehand.
+        known_covariance_mm2: (m, 3, 3) of it; large for points that are seen only.
     """
 
     cameras: tuple[Camera, ...]
@@ -69,7 +69,7 @@ class Linearised:
     """Whitened residuals about a state, and their derivatives.
 
     `seen` (n, 2) with `by_pose` (n, 2, 6) and `by_point` (n, 2, 3); `prior` (v, 6) of the poses with `prior_by_pose`
-    (v, 6, 6) and `prior_by_hand_eye` (v, 6, 6); `hand_eye` (6,) and `known` (3,) with their whitenings.
+    (v, 6, 6) and `prior_by_hand_eye` (v, 6, 6); `hand_eye` (6,) and `known` (m, 3) of points with their whitenings.
     """
 
     seen: FloatArray
@@ -147,8 +147,9 @@ class _Normal:
         starts = np.searchsorted(problem.point[order], np.arange(points))
         self._points = np.add.reduceat((by_point @ at.by_point)[order], starts, axis=0)
         self._point_side = np.add.reduceat((by_point @ at.seen[:, :, None])[order, :, 0], starts, axis=0)
-        self._points[0] += at.by_known.T @ at.by_known
-        self._point_side[0] += at.by_known.T @ at.known
+        known = np.swapaxes(at.by_known, 1, 2)
+        self._points += known @ at.by_known
+        self._point_side += (known @ at.known[:, :, None])[:, :, 0]
         mixed = np.zeros((views, 6, points, 3))  # a view sees a point once
         mixed[problem.view, :, problem.point] = by_pose @ at.by_point
         self._mixed = np.zeros((self._size, points, 3))
@@ -215,7 +216,7 @@ def _linearised(problem: Problem, state: State) -> Linearised:
     by_hand_eye = np.zeros((6, 6)) if problem.hand_eye_covariance is None else _whitening(problem.hand_eye_covariance)
     hand_eye = by_hand_eye @ state.hand_eye
     by_known = _whitening(problem.known_covariance_mm2)
-    known = by_known @ (state.points_mm[0] - problem.known_mm)
+    known = (by_known @ (state.points_mm - problem.known_mm)[:, :, None])[:, :, 0]
     length = np.linalg.norm(seen, axis=1)
     weights = np.minimum(1.0, problem.cut / np.maximum(length, 1e-12))
     held = np.minimum(length, problem.cut)
@@ -262,5 +263,5 @@ def _pose_priors(problem: Problem, state: State) -> tuple[FloatArray, FloatArray
 
 
 def _whitening(covariance: FloatArray) -> FloatArray:
-    """The matrix L⁻¹ with L Lᵀ the covariance."""
+    """The matrices L⁻¹ (..., k, k) with L Lᵀ the covariances."""
     return np.linalg.inv(np.linalg.cholesky(covariance))

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from glisson.core.arrays import FloatArray
+from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.errors import StageFailed
-from glisson.core.observations import Observations
+from glisson.core.observations import Observation, Observations
 from glisson.core.protocols import Progress, Reconstruction, silent
 from glisson.core.status import Status
 from glisson.core.transform import RigidTransform
@@ -28,6 +28,9 @@ _MOST_REFUSED = 0.5
 
 _CUT, _FAR = 3.0, 5.0
 """Features count less beyond the first, and not at all beyond the second, in standard deviations."""
+
+_LOOSE = 3.0
+"""The surface is as far as the touched point, give or take so many times that; it keeps what is wrong in reach."""
 
 _UNKNOWN_ROLL_RAD = 0.2
 """A roll that is known no better is first taken from the touched point."""
@@ -50,7 +53,8 @@ class Bundle:
 
     def reconstruct(self, views: ViewSet, progress: Progress = silent) -> Reconstruction:
         """Reconstruct landmarks and features; see `glisson.core.protocols.SurfaceReconstructor`."""
-        require_parallax(views, self._parameters.worst_mm)
+        sigma = views.landmarks.sigma_px if views.names else views.features.sigma_px
+        require_parallax(views.views, views.touched_mm, sigma, self._parameters.worst_mm)
         features, refused = _credible(views)
         try:
             problem, solution = _solved(views, features)
@@ -71,15 +75,15 @@ class Bundle:
 
 def _solved(views: ViewSet, features: Sightings) -> tuple[Problem, Solution]:
     """The adjustment, once more without the features that it leaves far from where they are seen."""
-    problem = _problem(views, features)
-    solution = solve(problem, _start(views, problem))
+    problem, start = _problem(views, features)
+    solution = solve(problem, start)
     far = (np.linalg.norm(solution.at.seen, axis=1) > _FAR)[len(problem.point) - len(features.point) :]
     if not far.any():
         return problem, solution
     bad = np.zeros(features.count, dtype=bool)
     bad[features.point[far]] = True
-    problem = _problem(views, _without(features, bad))
-    return problem, solve(problem, _start(views, problem))
+    problem, start = _problem(views, _without(features, bad))
+    return problem, solve(problem, start)
 
 
 def _credible(views: ViewSet) -> tuple[Sightings, int]:
@@ -106,17 +110,24 @@ def _without(seen: Sightings, bad: NDArray[np.bool_]) -> Sightings:
     return Sightings(numbers.astype(np.int64), seen.view[keep], seen.pixels[keep], seen.sigma_px)
 
 
-def _problem(views: ViewSet, features: Sightings) -> Problem:
-    """Point 0 is the touched one, then come landmarks and features."""
+def _problem(views: ViewSet, features: Sightings) -> tuple[Problem, State]:
+    """The measurements and where to start; point 0 is the touched one, then come landmarks and features."""
     count, landmarks = len(views.views), views.landmarks
     given = count + len(landmarks.point)
+    point = np.concatenate([np.zeros(count, int), 1 + landmarks.point, 1 + len(views.names) + features.point])
+    view = np.concatenate([np.arange(count), landmarks.view, features.view])
+    pixels = np.concatenate([[view.tip_px for view in views.views], landmarks.pixels, features.pixels])
+    start = _start(views, point, view, pixels)
+    distance = np.linalg.norm(views.touched_mm - start.centres_mm, axis=1).mean()
+    known = np.tile((_LOOSE * distance) ** 2 * np.eye(3), (len(start.points_mm), 1, 1))
+    known[0] = views.touched_covariance_mm2
     return Problem(
         cameras=tuple(view.camera for view in views.views),
         poses=tuple(view.room_from_camera for view in views.views),
         hand_eye_covariance=views.hand_eye_covariance,
-        point=np.concatenate([np.zeros(count, int), 1 + landmarks.point, 1 + len(views.names) + features.point]),
-        view=np.concatenate([np.arange(count), landmarks.view, features.view]),
-        pixels=np.concatenate([[view.tip_px for view in views.views], landmarks.pixels, features.pixels]),
+        point=point,
+        view=view,
+        pixels=pixels,
         sigma_px=np.concatenate(
             [
                 np.full(count, views.tip_sigma_px),
@@ -126,25 +137,25 @@ def _problem(views: ViewSet, features: Sightings) -> Problem:
         ),
         # What a person gave is never silently set aside; it is flagged.
         cut=np.concatenate([np.full(given, np.inf), np.full(len(features.point), _CUT)]),
-        known_mm=views.touched_mm,
-        known_covariance_mm2=views.touched_covariance_mm2,
-    )
+        known_mm=start.points_mm,
+        known_covariance_mm2=known,
+    ), start
 
 
-def _start(views: ViewSet, problem: Problem) -> State:
+def _start(views: ViewSet, point: IntArray, view: IntArray, pixels: FloatArray) -> State:
     """Poses as measured, and every point as far before the first scope that sees it as the touched one."""
     poses = [_rolled(views, number) for number in range(len(views.views))]
     rotations = np.stack([pose.rotation for pose in poses])
     centres = np.stack([pose.translation_mm for pose in poses])
-    _, first = np.unique(problem.point, return_index=True)
+    _, first = np.unique(point, return_index=True)
     points = np.tile(views.touched_mm, (len(first), 1))
-    for number, view in enumerate(views.views):
-        rows = first[problem.view[first] == number]
+    for number, one in enumerate(views.views):
+        rows = first[view[first] == number]
         if not len(rows):
             continue
-        rays = directions(view.camera, problem.pixels[rows]) @ rotations[number].T
+        rays = directions(one.camera, pixels[rows]) @ rotations[number].T
         depth = max(float((views.touched_mm - centres[number]) @ rotations[number][:, 2]), 10.0)
-        points[problem.point[rows]] = centres[number] + depth * rays / (rays @ rotations[number][:, 2])[:, None]
+        points[point[rows]] = centres[number] + depth * rays / (rays @ rotations[number][:, 2])[:, None]
     points[0] = views.touched_mm
     return State(rotations, centres, np.zeros(6), points)
 
@@ -164,16 +175,11 @@ def _rolled(views: ViewSet, number: int) -> RigidTransform:
     return RigidTransform(pose.target, pose.source, turned, pose.translation_mm, pose.covariance)
 
 
-def _observed(views: ViewSet, solution: Solution) -> tuple:  # type: ignore[type-arg]
-    points, covariance = solution.state.points_mm, _even(solution.of_points)
+def _observed(views: ViewSet, solution: Solution) -> tuple[Observation, ...]:
+    points, covariance = solution.state.points_mm, solution.of_points
     named = slice(1, 1 + len(views.names))
     found = landmark_observations(views.names, points[named], covariance[named])
     found += (observation("surface", "touched point", points[:1], covariance[:1]),)
     if len(points) > named.stop:
         found += (observation("surface", "features", points[named.stop :], covariance[named.stop :]),)
     return found
-
-
-def _even(matrices: FloatArray) -> FloatArray:
-    even: FloatArray = 0.5 * (matrices + np.swapaxes(matrices, 1, 2))
-    return even

@@ -1,6 +1,5 @@
 """Two-view reconstruction as the dissertation constructs it, with error bars by propagation."""
 
-from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -51,9 +50,7 @@ class Construction:
         if not len(chosen):
             raise BadInput(f"{views.views[first].name} and {views.views[second].name} have no landmark in common.")
         pair = (views.views[first], views.views[second])
-        require_parallax(
-            replace(views, views=pair, names=(), landmarks=views.features.none()), self._parameters.worst_mm
-        )
+        require_parallax(pair, views.touched_mm, seen.sigma_px, self._parameters.worst_mm)
         pixels = [seen.pixels[one[left]], seen.pixels[two[right]]]
         measured = _measured(views, pair, pixels)
         points, gaps = nearest_points(measured.centres_mm, lines(measured))

@@ -10,6 +10,7 @@ from scipy.stats import chi2
 
 from glisson.core.arrays import FloatArray
 from glisson.core.views import Sightings, View
+from glisson.intraoperative.cameras.projection import undistorted
 from glisson.intraoperative.views.epipolar import epipolar_statistics
 
 SIGMA_PX = 0.2
@@ -21,6 +22,7 @@ _RATIO = 0.8
 _SIFT_PX = 1.0
 _HALF, _MARGIN = 10, 6
 _LIKENESS = 0.9
+_LEAST_PAIRS, _OFF_PX = 8, 1.0
 _GLARE, _DARK = 245, 12
 _CELLS = 16
 _PER_CELL = 2
@@ -52,8 +54,9 @@ def match_features(
         if len(rows):
             places, alike = _refined(grey[0], grey[number], first[rows], places)
             rows, places = rows[alike], places[alike]
-            missed = epipolar_statistics(*pair, (first[rows], places), SIGMA_PX, hand_eye)
-            matched[number, rows[missed < _GATE]] = places[missed < _GATE]
+            good = epipolar_statistics(*pair, (first[rows], places), SIGMA_PX, hand_eye) < _GATE
+            good[good] = _consistent(pair, first[rows[good]], places[good])
+            matched[number, rows[good]] = places[good]
     return _sightings(matched, found[0].strengths)
 
 
@@ -130,6 +133,21 @@ def _refined(
         found[row] += moved
         alike[row] = likeness > _LIKENESS and np.linalg.norm(moved) < _MARGIN
     return found, alike
+
+
+def _consistent(views: tuple[View, View], one: FloatArray, two: FloatArray) -> NDArray[np.bool_]:
+    """Which pairs (n, 2) agree on some motion of the scope, before which they all lie (RANSAC, Nistér 2004)."""
+    if len(one) < _LEAST_PAIRS:
+        return np.zeros(len(one), dtype=bool)
+    flat = [undistorted(view.camera, pixels) for view, pixels in zip(views, (one, two), strict=True)]
+    tolerance = _OFF_PX / min(float(view.camera.focal_px.mean()) for view in views)
+    cv2.setRNGSeed(0)
+    motion, mask = cv2.findEssentialMat(flat[0], flat[1], np.eye(3), cv2.RANSAC, 0.9999, tolerance)
+    if motion is None or motion.shape != (3, 3):
+        return np.zeros(len(one), dtype=bool)
+    _, _, _, before, _ = cv2.recoverPose(motion, flat[0], flat[1], np.eye(3), distanceThresh=1e4, mask=mask)
+    agreed: NDArray[np.bool_] = before.ravel() > 0
+    return agreed
 
 
 def _sightings(matched: FloatArray, strengths: FloatArray) -> Sightings:

@@ -1,11 +1,13 @@
 """The angle between the rays to a point, and how large it must be for points to be worth anything."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from glisson.core.arrays import FloatArray
 from glisson.core.errors import StageFailed
 from glisson.core.status import Status
-from glisson.core.views import ViewSet
+from glisson.core.views import View
 
 
 def parallax_rad(centres_mm: FloatArray, points_mm: FloatArray) -> FloatArray:
@@ -17,18 +19,17 @@ def parallax_rad(centres_mm: FloatArray, points_mm: FloatArray) -> FloatArray:
     return angles
 
 
-def require_parallax(views: ViewSet, worst_mm: float) -> None:
+def require_parallax(views: Sequence[View], touched_mm: FloatArray, sigma_px: float, worst_mm: float) -> None:
     """Refuse views that are so near to each other that pixels alone leave more than `worst_mm` of depth open.
 
     Raises:
         StageFailed: they are (unobservable).
     """
-    centres = np.stack([view.room_from_camera.translation_mm for view in views.views])
-    angle = float(parallax_rad(centres, views.touched_mm[None])[0])
-    sigma = views.landmarks.sigma_px if views.names else views.features.sigma_px
-    focal = float(np.mean([view.camera.focal_px.mean() for view in views.views]))
-    distance = float(np.linalg.norm(views.touched_mm - centres, axis=1).mean())
-    least = distance * np.sqrt(2.0) * sigma / focal / worst_mm
+    centres = np.stack([view.room_from_camera.translation_mm for view in views])
+    angle = float(parallax_rad(centres, touched_mm[None])[0])
+    focal = float(np.mean([view.camera.focal_px.mean() for view in views]))
+    distance = float(np.linalg.norm(touched_mm - centres, axis=1).mean())
+    least = distance * np.sqrt(2.0) * sigma_px / focal / worst_mm
     if angle < least:
         raise StageFailed(_too_close(angle, least, worst_mm), Status.UNOBSERVABLE)
 
