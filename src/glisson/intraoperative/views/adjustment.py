@@ -20,9 +20,6 @@ _STEPS = 60
 _SMALL = 1e-3
 """A step of less than so many standard deviations is no step."""
 
-_NO_GAIN = 1e-2
-"""A fall of χ² that means nothing."""
-
 _IDENTITY = RigidTransform("camera", "camera", np.eye(3), np.zeros(3))
 
 
@@ -97,8 +94,13 @@ class Solution:
     across: FloatArray
 
 
-def solve(problem: Problem, state: State) -> Solution:
+def solve(problem: Problem, state: State, least_gain: float = 1e-2) -> Solution:
     """The state of least cost by Levenberg's and Marquardt's method.
+
+    Args:
+        problem: what was measured.
+        state: where to start.
+        least_gain: it is at rest where χ² falls by less.
 
     Raises:
         StageFailed: it does not come to rest.
@@ -111,7 +113,7 @@ def solve(problem: Problem, state: State) -> Solution:
         if tried.cost <= at.cost + 1e-9:
             gain = at.cost - tried.cost
             state, at, damping = moved, tried, max(damping / 10.0, 1e-9)
-            if size < _SMALL or gain < _NO_GAIN:
+            if size < _SMALL or gain < least_gain:
                 return _solution(problem, state, at)
         else:
             damping *= 10.0
@@ -197,6 +199,10 @@ def _of_pose_priors(at: Linearised, size: int) -> tuple[FloatArray, FloatArray]:
 
 
 def _moved(state: State, poses: FloatArray, points: FloatArray) -> State:
+    """The state after a step; a point comes no nearer to a scope than half-way at once, so that none gets behind it."""
+    nearest = np.linalg.norm(state.points_mm[:, None] - state.centres_mm, axis=2).min(axis=1)
+    length = np.linalg.norm(points, axis=1)
+    points = points * np.minimum(1.0, 0.5 * nearest / np.maximum(length, 1e-12))[:, None]
     views = len(state.centres_mm)
     steps = poses[: 6 * views].reshape(views, 6)
     turns = Rotation.from_rotvec(steps[:, :3]).as_matrix()

@@ -1,5 +1,6 @@
 """Joint adjustment of scope poses, touched point, roll and hand–eye, over two or more views."""
 
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -28,6 +29,9 @@ _MOST_REFUSED = 0.5
 
 _CUT, _FAR = 3.0, 5.0
 """Features count less beyond the first, and not at all beyond the second, in standard deviations."""
+
+_ROUGH = 1.0
+"""The first adjustment need not be better than so much of χ²: with wrong features in it, it creeps."""
 
 _LOOSE = 3.0
 """The surface is as far as the touched point, give or take so many times that; it keeps what is wrong in reach."""
@@ -70,20 +74,20 @@ class Bundle:
                 "the views, or the poses are wrong. No feature was used.",
             )
         status = Status.AMBIGUOUS if wrong else Status.CONVERGED
-        return Reconstruction(Observations(_observed(views, solution)), status, wrong + notes, angle)
+        observed = _observed(views, solution, self._parameters.worst_mm)
+        return Reconstruction(Observations(observed), status, wrong + notes, angle)
 
 
 def _solved(views: ViewSet, features: Sightings) -> tuple[Problem, Solution]:
-    """The adjustment, once more without the features that it leaves far from where they are seen."""
+    """The adjustment: roughly first, then without the features that this leaves far from where they are seen."""
     problem, start = _problem(views, features)
-    solution = solve(problem, start)
-    far = (np.linalg.norm(solution.at.seen, axis=1) > _FAR)[len(problem.point) - len(features.point) :]
-    if not far.any():
-        return problem, solution
+    rough = solve(problem, start, _ROUGH)
+    far = (np.linalg.norm(rough.at.seen, axis=1) > _FAR)[len(problem.point) - len(features.point) :]
     bad = np.zeros(features.count, dtype=bool)
     bad[features.point[far]] = True
-    problem, start = _problem(views, _without(features, bad))
-    return problem, solve(problem, start)
+    problem, _ = _problem(views, _without(features, bad))
+    kept = np.concatenate([np.ones(1 + len(views.names), dtype=bool), ~bad])
+    return problem, solve(problem, replace(rough.state, points_mm=rough.state.points_mm[kept]))
 
 
 def _credible(views: ViewSet) -> tuple[Sightings, int]:
@@ -151,8 +155,6 @@ def _start(views: ViewSet, point: IntArray, view: IntArray, pixels: FloatArray) 
     points = np.tile(views.touched_mm, (len(first), 1))
     for number, one in enumerate(views.views):
         rows = first[view[first] == number]
-        if not len(rows):
-            continue
         rays = directions(one.camera, pixels[rows]) @ rotations[number].T
         depth = max(float((views.touched_mm - centres[number]) @ rotations[number][:, 2]), 10.0)
         points[point[rows]] = centres[number] + depth * rays / (rays @ rotations[number][:, 2])[:, None]
@@ -175,11 +177,13 @@ def _rolled(views: ViewSet, number: int) -> RigidTransform:
     return RigidTransform(pose.target, pose.source, turned, pose.translation_mm, pose.covariance)
 
 
-def _observed(views: ViewSet, solution: Solution) -> tuple[Observation, ...]:
+def _observed(views: ViewSet, solution: Solution, worst_mm: float) -> tuple[Observation, ...]:
+    """All landmarks, the touched point, and those features whose error bar is not longer than `worst_mm`."""
     points, covariance = solution.state.points_mm, solution.of_points
-    named = slice(1, 1 + len(views.names))
+    named, unnamed = slice(1, 1 + len(views.names)), np.arange(1 + len(views.names), len(points))
     found = landmark_observations(views.names, points[named], covariance[named])
     found += (observation("surface", "touched point", points[:1], covariance[:1]),)
-    if len(points) > named.stop:
-        found += (observation("surface", "features", points[named.stop :], covariance[named.stop :]),)
+    good = unnamed[np.linalg.eigvalsh(covariance[unnamed])[:, -1] <= worst_mm**2]
+    if len(good):
+        found += (observation("surface", "features", points[good], covariance[good]),)
     return found
