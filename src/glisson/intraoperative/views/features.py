@@ -17,6 +17,9 @@ SIGMA_PX = 0.2
 """Of a matched feature's place; a test measures it on rendered views."""
 
 _DETECTED = 4000
+_CONTRAST = 0.01
+"""Tissue is dull; features that are worth nothing fall out later."""
+
 _ALIKE = 8
 _RATIO = 0.8
 _SIFT_PX = 1.0
@@ -43,7 +46,7 @@ def match_features(
         hand_eye: (6, 6) as in `ViewSet`.
     """
     grey = [np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), dtype=np.uint8) for image in images]
-    sift = cv2.SIFT.create(_DETECTED)
+    sift = cv2.SIFT.create(_DETECTED, contrastThreshold=_CONTRAST)
     found = [_found(sift, image) for image in grey]
     first = found[0].places
     matched = np.full((len(images), len(first), 2), np.nan)

@@ -28,7 +28,7 @@ _BLOCK = 25
 FITTED, STATED = "fitted", "stated"
 """The noise with which the construction is as wrong as printed, and what the dissertation states of its trocar."""
 
-_NAMES = {FITTED: (*PAIRS, *BREATHING, TEN), STATED: (*PAIRS, TEN)}
+_NAMES = {FITTED: (*PAIRS, *BREATHING, TEN), STATED: tuple(PAIRS)}
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class SurfaceStudy:
             "pairs": {name: _pair(rows, FITTED, name) for name in PAIRS},
             "breathing": {name: _pair(rows, FITTED, name) for name in BREATHING},
             "ten_views": _pair(rows, FITTED, TEN),
-            "stated": {name: _pair(rows, STATED, name) for name in (*PAIRS, TEN)},
+            "stated": {name: _pair(rows, STATED, name) for name in PAIRS},
             "rendered": {name: _rendered(rows, name) for name in PAIRS},
             "failed": [outcome.message for _, outcome in given if not outcome.is_good],
             "unfinished": len(points) - len(given),
