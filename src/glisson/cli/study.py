@@ -19,6 +19,7 @@ from glisson.studies.region.study import RegionStudy
 from glisson.studies.segmentation.study import SegmentationStudy
 from glisson.studies.sensitivity.study import Sensitivity
 from glisson.studies.study import Study, run_study
+from glisson.studies.surface.study import SurfaceStudy
 from glisson.studies.trocar.study import TrocarStudy
 
 STUDIES = {
@@ -29,11 +30,12 @@ STUDIES = {
     "segmentation": "how well the liver is found in scans of the phantom family, and whether failures are flagged",
     "sensitivity": "how much mesh, law, stiffness, compressibility and contact move the tumour's place",
     "trocar": "how wrong the pose of a trocar is that sees crosses, and whether a wrong one passes silently",
+    "surface": "how wrong surface points from two laparoscope views are (the dissertation's Tables 3 and 4)",
 }
 
 
 _OWN_OPTIONS = {
-    "seed": (LiftRobustness.name, ContactStudy.name, TrocarStudy.name),
+    "seed": (LiftRobustness.name, ContactStudy.name, SurfaceStudy.name, TrocarStudy.name),
     "long": (Sensitivity.name,),
     "element": (Sensitivity.name,),
 }
@@ -48,7 +50,7 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seed",
         metavar="N",
-        help="seed of random numbers, a whole number (lift-robustness, contact, trocar; default 0)",
+        help="seed of random numbers, a whole number (lift-robustness, contact, surface, trocar; default 0)",
     )
     parser.add_argument("--out", metavar="DIR", help="folder of the study (default: ./studies/NAME)")
     parser.add_argument("--workers", metavar="N", help="processes on this machine (default: one for each core)")
@@ -90,6 +92,8 @@ def _study(arguments: argparse.Namespace) -> Study:
         return SegmentationStudy.of(arguments.quick)
     if arguments.study == TrocarStudy.name:
         return TrocarStudy.of(arguments.quick, seed)
+    if arguments.study == SurfaceStudy.name:
+        return SurfaceStudy.of(arguments.quick, seed)
     return Sensitivity.of(arguments.quick, arguments.long, arguments.element or "T10")
 
 
@@ -115,5 +119,5 @@ COMMAND = Command(
     "  glisson study sensitivity --scheduler tcp://127.0.0.1:8786 --json",
     _add_arguments,
     _run,
-    ("rows", "cases", "converged", "views", "silent_wrong", "flagged", "seconds"),
+    ("rows", "cases", "converged", "pairs", "breathing", "views", "silent_wrong", "flagged", "seconds"),
 )

@@ -26,9 +26,10 @@ from glisson.core.mesh import TetMesh, TriangleSurface
 from glisson.core.model import Material, Model
 from glisson.core.observations import Observations
 from glisson.core.scenario import Scenario
+from glisson.core.status import Status
 from glisson.core.structures import VesselTree
-from glisson.core.transform import RigidTransform
 from glisson.core.trocar import Trocar
+from glisson.core.views import ViewSet
 
 
 class Progress(Protocol):
@@ -208,11 +209,30 @@ class Registration(Technique, Protocol):
         """Deformation that explains the observations; unobservable or ambiguous is told by its status."""
 
 
+@dataclass(frozen=True, eq=False)
+class Reconstruction:
+    """Points of a surface in the frame "room".
+
+    `status` is "ambiguous" where measurements contradict each other, as `notes` say in sentences; `parallax_rad` is the
+    median angle between the views at the points.
+    """
+
+    observations: Observations
+    status: Status
+    notes: tuple[str, ...]
+    parallax_rad: float
+
+
 class SurfaceReconstructor(Technique, Protocol):
     """Makes surface points of laparoscope views (entry-point group `glisson.surface_reconstructors`)."""
 
-    def reconstruct(self, images: tuple[NDArray[np.uint8], ...], poses: tuple[RigidTransform, ...]) -> Observations:
-        """Points with covariance from images (h, w, 3) and the scope poses `room_from_camera`."""
+    def reconstruct(self, views: ViewSet, progress: Progress = silent) -> Reconstruction:
+        """Points with covariance.
+
+        Raises:
+            BadInput: something is missing that the technique needs.
+            StageFailed: the views are too close to each other (unobservable), or cannot be brought together.
+        """
 
 
 class Localiser(Technique, Protocol):

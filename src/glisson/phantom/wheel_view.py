@@ -92,5 +92,3 @@ def _stretched(rough: FloatArray, high: int, wide: int) -> FloatArray:
     tall = (1.0 - down) * rough[top] + down * rough[top + 1]
     stretched: FloatArray = (1.0 - across) * tall[:, left] + across * tall[:, left + 1]
     return stretched
-
-

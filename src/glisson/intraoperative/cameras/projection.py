@@ -46,6 +46,8 @@ def directions(camera: Camera, pixels: ArrayLike) -> FloatArray:
 def undistorted(camera: Camera, pixels: ArrayLike) -> FloatArray:
     """The slopes x / z and y / z (n, 2) of what is seen at pixels (n, 2)."""
     given = np.asarray(pixels, dtype=np.float64).reshape(-1, 1, 2)
+    if not len(given):
+        return given.reshape(0, 2)
     criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 50, 1e-12)
     flat = cv2.undistortPoints(given, camera.matrix, camera.distortion, criteria=criteria)
     return np.asarray(flat, dtype=np.float64).reshape(-1, 2)

@@ -1,0 +1,1 @@
+"""Surface points from two or more laparoscope views and one touched point."""

@@ -1,0 +1,1 @@
+"""The centreline of a guide wire or stent, as a curve along which material may slide."""
