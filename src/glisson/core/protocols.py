@@ -6,7 +6,7 @@ lab adds its own from a package of its own. Long work calls `progress` now and t
 KeyboardInterrupt and must not be swallowed.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
@@ -23,6 +23,7 @@ from glisson.core.model import Material, Model
 from glisson.core.observations import Observations
 from glisson.core.scenario import Scenario
 from glisson.core.structures import VesselTree
+from glisson.core.tracks import Tracks
 from glisson.core.transform import RigidTransform
 
 
@@ -218,4 +219,20 @@ class Localiser(Technique, Protocol):
 
         Raises:
             StageFailed: no pose, or an ambiguous one.
+        """
+
+
+class MarkerTracker(Technique, Protocol):
+    """Follows markers through a video (entry-point group `glisson.marker_trackers`)."""
+
+    def track(self, frames: Iterable[tuple[float, NDArray[np.uint8]]], markers_px: FloatArray) -> Tracks:
+        """Tracks in px.
+
+        Args:
+            frames: times (s) and pictures [row, column, red green blue], taken one after another.
+            markers_px: places (m, 2), u right and v down, in the first of them.
+
+        Raises:
+            BadInput: a marker that is outside the image.
+            StageFailed: there are fewer than two frames.
         """

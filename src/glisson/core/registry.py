@@ -12,6 +12,7 @@ from glisson.core.errors import BadInput
 from glisson.core.parameters import build_parameters
 from glisson.core.protocols import (
     Localiser,
+    MarkerTracker,
     MaterialLaw,
     Mesher,
     Registration,
@@ -36,6 +37,7 @@ KINDS: dict[str, tuple[str, type[Any]]] = {
     "registration": ("glisson.registrations", Registration),
     "surface-reconstructor": ("glisson.surface_reconstructors", SurfaceReconstructor),
     "localiser": ("glisson.localisers", Localiser),
+    "marker-tracker": ("glisson.marker_trackers", MarkerTracker),
 }
 """Kind of technique → entry-point group and protocol."""
 

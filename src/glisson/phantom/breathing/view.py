@@ -109,7 +109,7 @@ class BreathingVideo:
         return light
 
     def _seen(self, times_s: FloatArray) -> FloatArray:
-        """Pixels of the marks: of times (n,) as (m, n, 2), of times (frames, m, n) each mark's own (frames, m, n, 2)."""
+        """Pixels of the marks: of times (n,) as (m, n, 2); of each mark's own times (frames, m, n) with two more."""
         if times_s.ndim == 1:
             points = np.swapaxes(self.tissue.marks_at(self.motion, times_s), 0, 1)
         else:
