@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import find_peaks
 
@@ -20,19 +21,23 @@ _SMOOTH = 0.04
 _APART, _PROMINENT = 0.45, 0.35
 """Two inhalations are at least this share of a period apart, and stand out by this share of the signal's range."""
 
+_ENOUGH = 80
+"""Values per breath with which its shape is fitted."""
+
 _DWELL = 0.03
 """The share of the range by which the middle of all values must be nearer to one end, for that to be exhalation."""
 
 
 @dataclass(frozen=True, eq=False)
 class Cycles:
-    """Breaths of a recording.
+    """Breaths of a recording. A breath begins, at phase 0, with full exhalation, when the lungs begin to fill.
 
     Args:
         exhalations_s: moments of full exhalation (k + 1,); a breath lies between each two.
         inhalations_s: moments of full inhalation (k,), one in each breath.
         depths: of the breaths (k,), their mean being 1.
-        phase: of each frame (n,), in breaths since the first full exhalation; whole numbers are full exhalation.
+        levels: where the breaths end (k + 1,), from the first one, in depths: the drift.
+        phase: of each frame (n,), in breaths since the first full exhalation; NaN where no whole breath is.
         inhalation_phase: the share of a breath after which inhalation is full.
         notes: sentences on what a person should know.
     """
@@ -40,9 +45,22 @@ class Cycles:
     exhalations_s: FloatArray
     inhalations_s: FloatArray
     depths: FloatArray
+    levels: FloatArray
     phase: FloatArray
     inhalation_phase: float
     notes: tuple[str, ...] = ()
+
+    def phase_at(self, times_s: FloatArray) -> FloatArray:
+        """Phases (n,) at times (n,), as `phase`."""
+        return Knots(self.exhalations_s, self.inhalations_s, inhalation_phase=self.inhalation_phase).phase(times_s)
+
+    def depth_at(self, phase: FloatArray) -> FloatArray:
+        """The depth (n,) of the breath in which a phase (n,) lies."""
+        return np.asarray(self.depths[np.clip(phase.astype(np.int64), 0, len(self.depths) - 1)])
+
+    def level_at(self, times_s: FloatArray) -> FloatArray:
+        """The drift (n,) at times (n,): monotone from one full exhalation to the next."""
+        return np.asarray(PchipInterpolator(self.exhalations_s, self.levels)(times_s))
 
     @property
     def rate_per_minute(self) -> float:
@@ -70,11 +88,13 @@ def find_cycles(tracks: Tracks, exhaled_at_s: float | None = None) -> Cycles:
             f"Fewer than two whole breaths are in the {times[-1] - times[0]:.1f} s of the recording; record for longer.",
             Status.UNOBSERVABLE,
         )
-    knots = fitted_knots(times, values, Knots(times[lows], times[tops]))
+    block = max(int(period * tracks.frames_per_s / _ENOUGH), 1)
+    knots = fitted_knots(_means(times, block), _means(values, block), Knots(times[lows], times[tops]))
     return Cycles(
         knots.exhalations_s,
         knots.inhalations_s,
         knots.depths / knots.depths.mean(),
+        (knots.levels - knots.levels[0]) / knots.depths.mean(),
         knots.phase(times),
         knots.inhalation_phase,
         notes,
@@ -96,6 +116,12 @@ def _upright(signal: Signal, times: FloatArray, exhaled_at_s: float | None) -> t
         )
         return (values if lean > 0.0 else -values), (note,)
     return (values if lean > 0.0 else -values), ()
+
+
+def _means(values: FloatArray, block: int) -> FloatArray:
+    """Means of so many values after each other; what is left over at the end is left out."""
+    whole = len(values) // block * block
+    return np.asarray(values[:whole].reshape(-1, block).mean(axis=1))
 
 
 def _period(values: FloatArray, times: FloatArray) -> float:

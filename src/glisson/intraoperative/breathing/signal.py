@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from glisson.core.arrays import FloatArray
 from glisson.core.errors import StageFailed
@@ -13,6 +14,7 @@ LEAST_SEEN = 0.5
 """Markers that are lost in more than this share of the frames tell nothing of breathing."""
 
 _FILLINGS = 5
+_WAYS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,16 +45,22 @@ def breathing_signal(tracks: Tracks) -> Signal:
     return Signal(u[:, 0] * sizes[0] / np.sqrt(len(often)), filled, tuple(int(n) for n in often))
 
 
-def _filled(tracks: Tracks, often: np.ndarray) -> FloatArray:
-    """Places (n, k, 2): gaps are bridged in time, then put right by what two principal components say."""
-    seen = np.repeat(tracks.seen[:, often, None], 2, axis=2).reshape(len(tracks.times_s), -1)
-    values = tracks.places[:, often].reshape(len(tracks.times_s), -1).copy()
+def _filled(tracks: Tracks, often: NDArray[np.int64]) -> FloatArray:
+    """Places (n, k, 2): gaps are bridged in time, then filled with what the two main ways of all say of those seen."""
+    n = len(tracks.times_s)
+    seen = np.repeat(tracks.seen[:, often, None], 2, axis=2).reshape(n, -1)
+    values = tracks.places[:, often].reshape(n, -1).copy()
     for column in range(values.shape[1]):
         good = seen[:, column]
         values[~good, column] = np.interp(tracks.times_s[~good], tracks.times_s[good], values[good, column])
-    if not seen.all():
-        for _ in range(_FILLINGS):
-            mean = values.mean(axis=0)
-            u, sizes, v = np.linalg.svd(values - mean, full_matrices=False)
-            values = np.where(seen, values, (u[:, :2] * sizes[:2]) @ v[:2] + mean)
-    return values.reshape(len(values), len(often), 2)
+    patterns, which = np.unique(seen, axis=0, return_inverse=True)
+    for _ in range(_FILLINGS):
+        mean = values.mean(axis=0)
+        ways = np.linalg.svd(values - mean, full_matrices=False)[2][:_WAYS]
+        for number, pattern in enumerate(patterns):
+            if pattern.sum() < 2 * _WAYS or pattern.all():
+                continue
+            frames = np.flatnonzero(which.ravel() == number)
+            scores = np.linalg.lstsq(ways[:, pattern].T, (values[frames][:, pattern] - mean[pattern]).T, rcond=None)[0]
+            values[np.ix_(frames, ~pattern)] = mean[~pattern] + scores.T @ ways[:, ~pattern]
+    return values.reshape(n, len(often), 2)

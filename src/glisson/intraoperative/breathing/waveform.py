@@ -12,7 +12,7 @@ from glisson.core.arrays import FloatArray
 PIECES = 20
 """Cubic pieces of a breath's shape."""
 
-_ROUNDS = 4
+_ROUNDS = 3
 _FINE = np.linspace(0.0, 1.0, 1001)
 
 
@@ -123,7 +123,7 @@ def _moved(knots: Knots, shape: FloatArray, times: FloatArray, values: FloatArra
         fit = (periodic_basis(phase) - basis_0) @ shape
         return np.asarray(_level(changed, times) + _depth(changed, phase) * fit - values)
 
-    found = least_squares(off, np.zeros(4 * k + 2), jac_sparsity=_sparsity(knots, times), x_scale=1.0, max_nfev=12)
+    found = least_squares(off, np.zeros(4 * k + 2), jac_sparsity=_sparsity(knots, times), x_scale=1.0, max_nfev=8)
     return made(found.x)
 
 
