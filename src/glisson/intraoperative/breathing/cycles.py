@@ -1,6 +1,7 @@
 """Breaths told apart: when exhalation and inhalation are full, and the phase of each frame."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -85,7 +86,7 @@ def find_cycles(tracks: Tracks, exhaled_at_s: float | None = None) -> Cycles:
     tops, lows = _turns(smooth, period * tracks.frames_per_s)
     if len(tops) < 2 or len(lows) < 3:
         raise StageFailed(
-            f"Fewer than two whole breaths are in the {times[-1] - times[0]:.1f} s of the recording; record for longer.",
+            f"Fewer than two whole breaths are in the {times[-1] - times[0]:.1f} s recorded; record for longer.",
             Status.UNOBSERVABLE,
         )
     block = max(int(period * tracks.frames_per_s / _ENOUGH), 1)
@@ -152,7 +153,7 @@ def _turns(smooth: FloatArray, period_frames: float) -> tuple[np.ndarray, np.nda
     tops, _ = find_peaks(smooth, distance=max(_APART * period_frames, 1.0), prominence=_PROMINENT * extent)
     if len(tops) < 2:
         return tops, tops
-    lows = [int(a + np.argmin(smooth[a:b])) for a, b in zip(tops[:-1], tops[1:], strict=True)]
+    lows = [int(a + np.argmin(smooth[a:b])) for a, b in pairwise(tops)]
     # A breath at an end counts where its full exhalation is in the recording.
     before, after = smooth[: tops[0]], smooth[tops[-1] :]
     level, height = np.median(smooth[lows]), np.median(smooth[tops])

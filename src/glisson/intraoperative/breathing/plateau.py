@@ -98,7 +98,7 @@ def _fit(rates: FloatArray, values: FloatArray, weights: FloatArray, at: float) 
     design = _design(rates, at)
     coefficients = np.linalg.lstsq(design * weights[:, None], values * weights, rcond=None)[0]
     off = (design @ coefficients - values) * weights
-    return (float(off @ off) if coefficients[1] > 0.0 else np.inf), coefficients
+    return (float(off @ off) if coefficients[1] > 0.0 else np.inf), np.asarray(coefficients, dtype=np.float64)
 
 
 def _design(rates: FloatArray, at: float) -> FloatArray:

@@ -21,8 +21,8 @@ _WAYS = 2
 class Signal:
     """`values` (n,) along the main way of all markers together, in units of a mean marker's displacement.
 
-    `filled` (n, k, 2) are places of the k markers that are seen often enough (`markers`, their numbers), with those that
-    are missing put in by what the others do.
+    `filled` (n, k, 2) are places of the k markers that are seen often enough (`markers`, their numbers), with those
+    that are missing put in by what the others do.
     """
 
     values: FloatArray
@@ -53,6 +53,8 @@ def _filled(tracks: Tracks, often: NDArray[np.int64]) -> FloatArray:
     for column in range(values.shape[1]):
         good = seen[:, column]
         values[~good, column] = np.interp(tracks.times_s[~good], tracks.times_s[good], values[good, column])
+    if seen.all():
+        return values.reshape(n, len(often), 2)
     patterns, which = np.unique(seen, axis=0, return_inverse=True)
     for _ in range(_FILLINGS):
         mean = values.mean(axis=0)

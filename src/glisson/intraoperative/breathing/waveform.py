@@ -153,7 +153,7 @@ def _anchored(knots: Knots, shape: FloatArray) -> Knots:
     through = [float(_last_below(shares, level)) for level in (0.025, 0.1)]
     low = 1e-3 * (before[0] + 2.0 * through[0] - through[1])
     high = 1e-3 * top
-    k = np.arange(len(knots.exhalations_s))
+    k = np.arange(len(knots.exhalations_s), dtype=np.float64)
     return replace(
         knots,
         exhalations_s=knots.moments(k + low),

@@ -17,7 +17,7 @@ from glisson.intraoperative.tracks.markers import BORDER_PX, grey_of
 from glisson.intraoperative.tracks.patches import RADIUS_PX, Aligned, Patches
 from glisson.intraoperative.tracks.searching import expected_places, search
 
-_WINDOW = {"winSize": (21, 21), "maxLevel": 3}
+_WINDOW_PX, _LEVELS = 21, 3
 _SEARCHES = 3
 """So many lost markers are searched for in a frame; the others have their turn in the next ones."""
 
@@ -117,11 +117,10 @@ class _Run:
     def _flow(self, grey: NDArray[np.uint8], known: NDArray[np.int64]) -> tuple[FloatArray, NDArray[np.bool_]]:
         """Where the known markers (k,) went (k, 2), and whether they come back from there."""
         start = self._now[known].astype(np.float32)
-        there, good, _ = cv2.calcOpticalFlowPyrLK(self._previous, grey, start, None, **_WINDOW)
-        back, good_back, _ = cv2.calcOpticalFlowPyrLK(grey, self._previous, there, None, **_WINDOW)
+        there, good = _flow(self._previous, grey, start)
+        back, good_back = _flow(grey, self._previous, there)
         off = np.linalg.norm(back - start, axis=1)
-        sure = (good.ravel() > 0) & (good_back.ravel() > 0) & (off < self._parameters.back_px)
-        return there.astype(np.float64), sure
+        return there.astype(np.float64), good & good_back & (off < self._parameters.back_px)
 
     def _find_again(
         self, grey: NDArray[np.uint8], lost: NDArray[np.int64], states: NDArray[np.int8], covariance: FloatArray
@@ -167,6 +166,16 @@ class _Run:
         more = _SYSTEMATIC_PX**2 + (_SPOILT_PX * found.spoilt[good] ** 2) ** 2
         covariance[markers] = found.covariance[good] + more[:, None, None] * np.eye(2)
         states[markers] = state
+
+
+def _flow(
+    before: NDArray[np.uint8], after: NDArray[np.uint8], places: NDArray[np.float32]
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Where places (k, 2) of a frame went in another, and whether that is known at all."""
+    guess = np.zeros_like(places)
+    window = (_WINDOW_PX, _WINDOW_PX)
+    there, good, _ = cv2.calcOpticalFlowPyrLK(before, after, places, guess, winSize=window, maxLevel=_LEVELS)
+    return np.asarray(there, dtype=np.float32).reshape(-1, 2), np.asarray(good).ravel() > 0
 
 
 def _check_markers(markers: FloatArray, shape: tuple[int, ...]) -> None:

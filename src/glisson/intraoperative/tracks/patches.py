@@ -125,7 +125,7 @@ class Patches:
             weighed = (jacobian * self._weight[clean, None]).T
             normal = weighed @ jacobian + np.diag(self._prior) + 1e-6 * np.eye(8)
             step[k, :, 0] = np.linalg.solve(normal, weighed @ off[k, clean] + pull[k])
-        return step[:, :, 0]
+        return np.asarray(step[:, :, 0])
 
     def _residual(
         self, now: FloatArray, first: FloatArray, gain: FloatArray, offset: FloatArray

@@ -36,7 +36,7 @@ class Breaths:
     Args:
         starts_s: moments of full exhalation (k + 1,); a breath lies between each two.
         depths: of the breaths (k,), about 1.
-        levels: `along` at the moments of full exhalation (k + 1,), about 0: the drift, which eases from one to the next.
+        levels: `along` at the moments of full exhalation (k + 1,), about 0: the drift, easing from one to the next.
     """
 
     starts_s: FloatArray
@@ -70,20 +70,21 @@ class Breaths:
 
 @dataclass(frozen=True)
 class Ventilator:
-    """High-frequency ventilation: `rate_hz` strokes per second, all alike, the first begun at `start_s`."""
+    """High-frequency ventilation: `rate_hz` strokes per second of one `depth`, the first begun at `start_s`."""
 
     rate_hz: float
+    depth: float = 1.0
     start_s: float = 0.0
 
     def along(self, times_s: ArrayLike) -> FloatArray:
         """As `Motion.along`."""
         turn = 2.0 * np.pi * self.rate_hz * (np.asarray(times_s, dtype=np.float64) - self.start_s)
-        return np.asarray(0.5 - 0.5 * np.cos(turn))
+        return np.asarray(self.depth * (0.5 - 0.5 * np.cos(turn)))
 
     def across(self, times_s: ArrayLike) -> FloatArray:
         """As `Motion.across`."""
         turn = 2.0 * np.pi * self.rate_hz * (np.asarray(times_s, dtype=np.float64) - self.start_s)
-        return np.asarray(np.sin(turn))
+        return np.asarray(self.depth * np.sin(turn))
 
 
 def waveform(within: FloatArray) -> FloatArray:

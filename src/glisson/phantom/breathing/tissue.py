@@ -53,10 +53,10 @@ class Tissue:
         side = np.column_stack([self.side_by_place, self.side_mm])
         return np.asarray(rest + along * main + across * side)
 
-    def marks_at(self, motion: Motion, times_s: ArrayLike) -> FloatArray:
-        """Places (…, m, 3) of the marks in the camera's frame (mm) at times (…)."""
+    def marks_at(self, motion: Motion, times_s: FloatArray) -> FloatArray:
+        """Places (…, m, 3) of the marks in the camera's frame (mm) at times (…, m), or (…, 1) for all the same."""
         flat = np.column_stack([self.marks_mm, np.ones(len(self.marks_mm))])
-        return np.asarray(flat @ np.swapaxes(self.frames(motion, times_s), -1, -2))
+        return np.asarray((self.frames(motion, times_s) @ flat[:, :, None])[..., 0])
 
     @cached_property
     def texture(self) -> NDArray[np.uint8]:
