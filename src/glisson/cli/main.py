@@ -40,6 +40,8 @@ COMMANDS = {
     "resections": "list what each liver resection would take of the segments, and what would remain",
     "export": "write the labels of a case as one segmentation for other programs (3D Slicer, DICOM)",
     "deidentify": "copy DICOM files without what tells who the patient is (the standard's basic profile)",
+    "track": "follow markers through a laparoscope's video",
+    "breathing": "tell breaths in markers' motion and take breathing away; compare rates of ventilation",
     "benchmark": "measure Glisson beside other engines (in a checkout; make bench installs them)",
     "study": "compute many points, each once, and tell what they say together",
     "verify": "compare the tissue mechanics with closed forms, published figures and another engine",

@@ -127,7 +127,8 @@ class _Run:
     ) -> None:
         """Look where the other markers say that a lost one should be, then around there."""
         followed = states != PointState.LOST
-        guesses, warps = expected_places(self._first, self._now, followed, lost)
+        everywhere, warps = expected_places(self._first, self._now, followed, np.arange(len(self._first)))
+        guesses, warps = everywhere[lost], warps[lost]
         found = self._patches.aligned(grey, lost, guesses, warps)
         near = np.linalg.norm(found.places - guesses, axis=1) < RADIUS_PX / 2.0
         good = near & self._believed(found, warps, grey.shape, _AGAIN)
@@ -139,7 +140,8 @@ class _Run:
             template = self._patches.templates(marker)[0]
             reach = min(RADIUS_PX + 2.0 * self._lost_for[marker[0]], self._parameters.reach_px)
             place = search(grey, template, guesses[n], reach, self._parameters.likeness)
-            if place is None:
+            # Burnt spots look alike: what lies where another marker should be is taken for that.
+            if place is None or np.argmin(np.linalg.norm(everywhere - place, axis=1)) != marker[0]:
                 continue
             found = self._patches.aligned(grey, marker, place[None], warps[[n]])
             good = self._believed(found, warps[[n]], grey.shape, _AGAIN)

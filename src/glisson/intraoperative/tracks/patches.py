@@ -56,7 +56,6 @@ class Patches:
     def __init__(self, grey: NDArray[np.uint8], places: FloatArray) -> None:
         side = np.arange(-RADIUS_PX, RADIUS_PX + 1, dtype=np.float64)
         y, x = (axis.ravel() for axis in np.meshgrid(side, side, indexing="ij"))
-        self._grid = np.column_stack([x, y])
         self._weight = np.exp(-0.5 * (x * x + y * y) / (0.6 * RADIUS_PX) ** 2)
         self._weight /= self._weight.mean()
         no_warp = np.zeros((len(places), 2, 2))
@@ -83,14 +82,17 @@ class Patches:
         places, warps = places.copy(), warps.copy()
         first = self._first[which]
         gain, offset = np.ones(len(which)), np.zeros(len(which))
+        moving = np.arange(len(which))
         for _ in range(_ITERATIONS):
-            off, outside = self._residual(self._sampled(grey, places, warps), first, gain, offset)
-            step = self._step(which, off, outside, warps)
-            places -= step[:, :2]
-            warps -= step[:, 2:6].reshape(-1, 2, 2)
-            offset += gain * step[:, 7]
-            gain *= np.clip(1.0 + step[:, 6], 0.5, 2.0)
-            if np.abs(step[:, :2]).max(initial=0.0) < _STILL_PX:
+            now = self._sampled(grey, places[moving], warps[moving])
+            off, outside = self._residual(now, first[moving], gain[moving], offset[moving])
+            step = self._step(which[moving], off, outside, warps[moving])
+            places[moving] -= step[:, :2]
+            warps[moving] -= step[:, 2:6].reshape(-1, 2, 2)
+            offset[moving] += gain[moving] * step[:, 7]
+            gain[moving] *= np.clip(1.0 + step[:, 6], 0.5, 2.0)
+            moving = moving[np.abs(step[:, :2]).max(axis=1) > _STILL_PX]
+            if len(moving) == 0:
                 break
         now = self._sampled(grey, places, warps)
         off, outside = self._residual(now, first, gain, offset)
@@ -107,9 +109,8 @@ class Patches:
 
     def _sampled(self, grey: NDArray[np.uint8], places: FloatArray, warps: FloatArray) -> FloatArray:
         """Grey values (k, side²) of a frame where the patches lie."""
-        at = places[:, None, :] + self._grid + self._grid / RADIUS_PX @ np.swapaxes(warps, 1, 2)
-        values = np.zeros(at.shape[:2])
-        _sample(grey, at, values)
+        values = np.zeros((len(places), (2 * RADIUS_PX + 1) ** 2))
+        _sample(grey, places, warps, values)
         return values
 
     def _step(
@@ -133,7 +134,8 @@ class Patches:
         """Grey values off (k, side²), and which of them are of something else."""
         off = (now - offset[:, None]) / gain[:, None] - first
         size = np.abs(off)
-        limit = _OUTLIER * np.maximum(1.4826 * np.median(size, axis=1, keepdims=True), _NOISE)
+        # A quarter of the pixels tells the spread as well.
+        limit = _OUTLIER * np.maximum(1.4826 * np.median(size[:, ::4], axis=1, keepdims=True), _NOISE)
         return off, size > limit
 
     def _likeness(self, now: FloatArray, first: FloatArray) -> FloatArray:
@@ -145,15 +147,20 @@ class Patches:
 
 
 @compiled
-def _sample(grey: NDArray[np.uint8], at: FloatArray, values: FloatArray) -> None:
-    """Bilinear grey values at (k, n, 2) px; beyond the border they are those of the border."""
+def _sample(grey: NDArray[np.uint8], places: FloatArray, warps: FloatArray, values: FloatArray) -> None:
+    """Bilinear grey values (k, side²) of patches; beyond the border they are those of the border."""
     rows, columns = grey.shape
-    for k in range(at.shape[0]):
-        for n in range(at.shape[1]):
-            u = min(max(at[k, n, 0], 0.0), columns - 1.000001)
-            v = min(max(at[k, n, 1], 0.0), rows - 1.000001)
-            i, j = int(v), int(u)
-            a, b = v - i, u - j
-            top = (1.0 - b) * grey[i, j] + b * grey[i, j + 1]
-            low = (1.0 - b) * grey[i + 1, j] + b * grey[i + 1, j + 1]
-            values[k, n] = (1.0 - a) * top + a * low
+    for k in range(len(places)):
+        n = 0
+        for y in range(-RADIUS_PX, RADIUS_PX + 1):
+            for x in range(-RADIUS_PX, RADIUS_PX + 1):
+                u = places[k, 0] + x + (warps[k, 0, 0] * x + warps[k, 0, 1] * y) / RADIUS_PX
+                v = places[k, 1] + y + (warps[k, 1, 0] * x + warps[k, 1, 1] * y) / RADIUS_PX
+                u = min(max(u, 0.0), columns - 1.000001)
+                v = min(max(v, 0.0), rows - 1.000001)
+                i, j = int(v), int(u)
+                a, b = v - i, u - j
+                top = (1.0 - b) * grey[i, j] + b * grey[i, j + 1]
+                low = (1.0 - b) * grey[i + 1, j] + b * grey[i + 1, j + 1]
+                values[k, n] = (1.0 - a) * top + a * low
+                n += 1
