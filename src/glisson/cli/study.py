@@ -19,6 +19,7 @@ from glisson.studies.region.study import RegionStudy
 from glisson.studies.segmentation.study import SegmentationStudy
 from glisson.studies.sensitivity.study import Sensitivity
 from glisson.studies.study import Study, run_study
+from glisson.studies.ventilation.study import VentilationStudy
 
 STUDIES = {
     "contact": "how far the tumour is apart with our contact and with that of the IPC Toolkit",
@@ -27,11 +28,12 @@ STUDIES = {
     "region": "how much faster a lift is by its region of interest, and what that costs",
     "segmentation": "how well the liver is found in scans of the phantom family, and whether failures are flagged",
     "sensitivity": "how much mesh, law, stiffness, compressibility and contact move the tumour's place",
+    "ventilation": "how well breathing is told and taken away, and where faster ventilation stops helping",
 }
 
 
 _OWN_OPTIONS = {
-    "seed": (LiftRobustness.name, ContactStudy.name),
+    "seed": (LiftRobustness.name, ContactStudy.name, VentilationStudy.name),
     "long": (Sensitivity.name,),
     "element": (Sensitivity.name,),
 }
@@ -44,7 +46,7 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quick", action="store_true", help="a minute's worth of points, after a set-up that is kept")
     parser.add_argument("--long", action="store_true", help="with the largest meshes (sensitivity)")
     parser.add_argument(
-        "--seed", metavar="N", help="seed of random numbers, a whole number (lift-robustness, contact; default 0)"
+        "--seed", metavar="N", help="seed of random numbers, a whole number (lift-robustness, contact, ventilation)"
     )
     parser.add_argument("--out", metavar="DIR", help="folder of the study (default: ./studies/NAME)")
     parser.add_argument("--workers", metavar="N", help="processes on this machine (default: one for each core)")
@@ -84,6 +86,8 @@ def _study(arguments: argparse.Namespace) -> Study:
         return RegionStudy.of(arguments.quick)
     if arguments.study == SegmentationStudy.name:
         return SegmentationStudy.of(arguments.quick)
+    if arguments.study == VentilationStudy.name:
+        return VentilationStudy.of(arguments.quick, seed)
     return Sensitivity.of(arguments.quick, arguments.long, arguments.element or "T10")
 
 

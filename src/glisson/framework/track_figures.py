@@ -110,11 +110,11 @@ def draw_distance(tracks: Tracks, pair: tuple[int, int], exhalations_s: FloatArr
 
 
 def draw_trajectories(named: Sequence[tuple[str, FloatArray, FloatArray]], unit: str) -> Picture:
-    """Displacements of one marker, each a name, times (n,) and values (n,) (the dissertation's Figure II.45)."""
+    """Three displacements of a marker, each a name, times (n,) and values (n,) (the dissertation's Figure II.45)."""
     figure = new_figure(1000, 360)
     axes = figure.add_axes((0.08, 0.15, 0.89, 0.72))
-    for (name, times, values), colour, style in zip(named, (BLUE, VERMILLION, GREEN), ("-", "--", ":"), strict=False):
-        axes.plot(times, values, style, color=colour, lw=1.4, label=name)
+    for (name, times, values), colour in zip(named, (BLUE, VERMILLION, BLACK), strict=True):
+        axes.plot(times, values, color=colour, lw=1.3, label=name)
     axes.set(xlabel="time (s)", ylabel=f"displacement ({unit})")
     axes.legend(fontsize=10.5, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
     return picture(
@@ -141,7 +141,7 @@ def draw_rates(displacements: Sequence[Displacement], plateau: Plateau, unit: st
     axes.set(xlabel="rate (Hz)", ylabel=f"peak-to-peak displacement ({unit})")
     axes.set_ylim(bottom=0.0)
     _per_minute(axes)
-    axes.legend(fontsize=10.5)
+    axes.legend(fontsize=10.5, loc="upper center")
     return picture(figure, "Displacement against rate.", "Displacement of the markers against rate (as Figure II.46).")
 
 

@@ -15,8 +15,8 @@ _LEAST_STROKES = 8
 _RATE_SHARE, _RATE_STEPS = 0.01, 21
 """Ventilators keep their rate to within this share; the rate that explains most is taken."""
 
-_AVERAGED_SHARE = 0.6
-"""An exposure may take this share of a stroke; then half of the motion is left (sinc 0.6 = 0.50)."""
+AVERAGED_SHARE = 0.4
+"""An exposure may take this share of a stroke; then three quarters of the motion are left (sinc 0.4 = 0.76)."""
 
 _DRIFT = 3
 """Coefficients of the polynomial in time that takes drift away."""
@@ -110,10 +110,10 @@ def _reasons(tracks: Tracks, rate_hz: float, frames_per_s: float, exposure_s: fl
             f"{frames_per_s:.1f} pictures per second cannot resolve {rate_hz:g} Hz; more than {2.0 * rate_hz:.0f} are "
             "needed."
         )
-    if rate_hz * exposure_s > _AVERAGED_SHARE:
+    if rate_hz * exposure_s > AVERAGED_SHARE:
         reasons.append(
             f"An exposure of {1e3 * exposure_s:.0f} ms averages over {rate_hz * exposure_s:.2f} of a stroke at "
-            f"{rate_hz:g} Hz; it must be shorter than {1e3 * _AVERAGED_SHARE / rate_hz:.0f} ms."
+            f"{rate_hz:g} Hz; it must be shorter than {1e3 * AVERAGED_SHARE / rate_hz:.0f} ms."
         )
     return tuple(reasons)
 
@@ -137,7 +137,7 @@ def _fundamental(times: FloatArray, places: FloatArray, rate_hz: float) -> tuple
     off = places - design @ solution
     count = places.shape[1] // 2
     noise = float((off**2).sum() / ((len(times) - design.shape[1]) * places.shape[1]))
-    variance = noise * float(np.linalg.inv(design.T @ design)[0, 0])
+    variance = noise * max(float(np.linalg.pinv(design.T @ design)[0, 0]), 0.0)
     largest = float(np.linalg.svd(solution[:2].T, compute_uv=False)[0])
     square = max(largest**2 - places.shape[1] * variance, 0.0)
     return float(np.sqrt(square / count)), float(np.sqrt(variance / count))
