@@ -21,8 +21,8 @@ AVERAGED_SHARE = 0.4
 _DRIFT = 3
 """Coefficients of the polynomial in time that takes drift away."""
 
-_REPEATED = 0.02
-"""A frame in which the markers moved less than this share of what is usual is the one before, shown again."""
+_REPEATED = 0.3
+"""A frame in which the markers moved by less than this share of their standard deviation is the one before again."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def displacement_at(tracks: Tracks, rate_hz: float, exposure_s: float | None = N
     """
     _check(tracks, rate_hz, exposure_s)
     filled = breathing_signal(tracks).filled
-    fresh = fresh_frames(filled)
+    fresh = fresh_frames(tracks)
     frames_per_s = tracks.frames_per_s * float(fresh.mean())
     exposure = 0.5 / frames_per_s if exposure_s is None else exposure_s
     reasons = _reasons(tracks, rate_hz, frames_per_s, exposure)
@@ -78,14 +78,18 @@ def displacement_at(tracks: Tracks, rate_hz: float, exposure_s: float | None = N
     )
 
 
-def fresh_frames(places: FloatArray) -> NDArray[np.bool_]:
+def fresh_frames(tracks: Tracks) -> NDArray[np.bool_]:
     """Which frames (n,) are pictures of their own; recorders that are faster than the camera repeat the one before.
 
-    Args:
-        places: (n, k, 2) of markers; noise makes them move from each picture to the next.
+    Noise moves the markers from each picture to the next, even where the tissue stands still.
     """
-    moves = np.abs(np.diff(places, axis=0)).mean(axis=(1, 2))
-    return np.append(True, moves > _REPEATED * np.percentile(moves, 90.0))
+    moves = np.linalg.norm(np.diff(tracks.places, axis=0), axis=2)
+    sigma = np.sqrt(np.trace(tracks.covariance[1:], axis1=2, axis2=3))
+    known = np.isfinite(moves)
+    moved = np.where(known, moves / np.where(known, sigma, 1.0), np.inf)
+    # The middle marker of those that are seen: one that has just been found again may still settle.
+    middle = np.sort(moved, axis=1)[np.arange(len(moved)), known.sum(axis=1) // 2]
+    return np.append(True, middle > _REPEATED)
 
 
 def _check(tracks: Tracks, rate_hz: float, exposure_s: float | None) -> None:

@@ -13,7 +13,7 @@ from glisson.core.tracks import Tracks
 LEAST_SEEN = 0.5
 """Markers that are lost in more than this share of the frames tell nothing of breathing."""
 
-_FILLINGS = 5
+_FILLINGS = 10
 _WAYS = 2
 
 
@@ -58,11 +58,16 @@ def _filled(tracks: Tracks, often: NDArray[np.int64]) -> FloatArray:
     patterns, which = np.unique(seen, axis=0, return_inverse=True)
     for _ in range(_FILLINGS):
         mean = values.mean(axis=0)
-        ways = np.linalg.svd(values - mean, full_matrices=False)[2][:_WAYS]
+        _, sizes, ways = np.linalg.svd(values - mean, full_matrices=False)
+        ways = ways[:_WAYS]
+        # How far each way is likely to be gone, against noise: a way that only a bridged marker takes stays short.
+        noise = (sizes[_WAYS:] ** 2).sum() / max(values.shape[1] - _WAYS, 1)
+        prior = np.diag(noise / np.maximum(sizes[: len(ways)] ** 2, 1e-12))
         for number, pattern in enumerate(patterns):
-            if pattern.sum() < 2 * _WAYS or pattern.all():
+            if pattern.all() or not pattern.any():
                 continue
             frames = np.flatnonzero(which.ravel() == number)
-            scores = np.linalg.lstsq(ways[:, pattern].T, (values[frames][:, pattern] - mean[pattern]).T, rcond=None)[0]
+            known = ways[:, pattern]
+            scores = np.linalg.solve(known @ known.T + prior, known @ (values[frames][:, pattern] - mean[pattern]).T)
             values[np.ix_(frames, ~pattern)] = mean[~pattern] + scores.T @ ways[:, ~pattern]
     return values.reshape(n, len(often), 2)

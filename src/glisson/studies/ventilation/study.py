@@ -32,9 +32,9 @@ class VentilationStudy:
     name: ClassVar[str] = "ventilation"
 
     seed: int = 0
-    sweeps: int = 300
+    sweeps: int = 200
     pixel_sweeps: int = 4
-    breaths: int = 60
+    breaths: int = 40
     pixel_breaths: int = 4
     conventional: int = 2
 

@@ -74,7 +74,7 @@ def sweep_rates(inputs: Mapping[str, Any], folder: Path) -> Outcome:
 
 
 def tell_breaths(inputs: Mapping[str, Any], folder: Path) -> Outcome:
-    """`rows`: errors of phase and residuals of irregular breaths. Inputs as of `sweep_rates`, and the video's."""
+    """`rows`: errors of phase and residuals of irregular breaths; arrays: the tracks of the last one."""
     rows: list[dict[str, Any]] = []
     arrays: dict[str, NDArray[Any]] = {}
     marks = MARKS if inputs["noise_px"] is None else FEW_MARKS
@@ -92,7 +92,7 @@ def tell_breaths(inputs: Mapping[str, Any], folder: Path) -> Outcome:
                 "residual_worst_mm": None,
             }
         rows.append({"seed": seed, **row})
-    return Outcome({"rows": rows}, arrays if inputs["noise_px"] is None else {})
+    return Outcome({"rows": rows}, arrays)
 
 
 def conventional(inputs: Mapping[str, Any], folder: Path) -> Outcome:
