@@ -47,6 +47,8 @@ COMMANDS = {
     "instruments": "keep a library of instruments, recognise them in a trocar's camera, and tell when they were in use",
     "pointer": "tell points, distances, strokes and a resection plane that an instrument's tip has drawn",
     "markers": "write wheels, crosses and calibration boards as PDF to print at true scale",
+    "track": "follow markers through a laparoscope's video",
+    "breathing": "tell breaths in markers' motion and take breathing away; compare rates of ventilation",
     "benchmark": "measure Glisson beside other engines (in a checkout; make bench installs them)",
     "study": "compute many points, each once, and tell what they say together",
     "verify": "compare the tissue mechanics with closed forms, published figures and another engine",

@@ -110,6 +110,36 @@ def point_from_text(text: str) -> tuple[float, float, float]:
     return x, y, z
 
 
+def positive_from_text(text: str, option: str) -> float:
+    """A positive number.
+
+    Raises:
+        BadInput: it is none.
+    """
+    try:
+        number = float(text)
+    except ValueError:
+        number = -1.0
+    if not (isfinite(number) and number > 0.0):
+        raise BadInput(f"{option} must be a positive number, not {text!r}.")
+    return number
+
+
+def pixel_from_text(text: str) -> tuple[float, float]:
+    """A place in an image from "U,V".
+
+    Raises:
+        BadInput: these are not two finite numbers.
+    """
+    try:
+        u, v = (float(number) for number in text.split(","))
+    except ValueError:
+        raise BadInput(f"A place in an image is written U,V in px, for example 312,200.5, not {text!r}.") from None
+    if not (isfinite(u) and isfinite(v)):
+        raise BadInput(f"A place in an image needs two finite numbers, not {text!r}.")
+    return u, v
+
+
 def _plain(kind: type[Any], texts: dict[str, str]) -> dict[str, Any]:
     hints = get_type_hints(kind)
     return {name: _from_text(hints.get(name, str), text) for name, text in texts.items()}

@@ -21,6 +21,7 @@ from glisson.studies.sensitivity.study import Sensitivity
 from glisson.studies.study import Study, run_study
 from glisson.studies.surface.study import SurfaceStudy
 from glisson.studies.trocar.study import TrocarStudy
+from glisson.studies.ventilation.study import VentilationStudy
 
 STUDIES = {
     "contact": "how far the tumour is apart with our contact and with that of the IPC Toolkit",
@@ -31,11 +32,12 @@ STUDIES = {
     "sensitivity": "how much mesh, law, stiffness, compressibility and contact move the tumour's place",
     "trocar": "how wrong the pose of a trocar is that sees crosses, and whether a wrong one passes silently",
     "surface": "how wrong surface points from two laparoscope views are (the dissertation's Tables 3 and 4)",
+    "ventilation": "how well breathing is told and taken away, and where faster ventilation stops helping",
 }
 
 
 _OWN_OPTIONS = {
-    "seed": (LiftRobustness.name, ContactStudy.name, SurfaceStudy.name, TrocarStudy.name),
+    "seed": (LiftRobustness.name, ContactStudy.name, SurfaceStudy.name, TrocarStudy.name, VentilationStudy.name),
     "long": (Sensitivity.name,),
     "element": (Sensitivity.name,),
 }
@@ -48,10 +50,9 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quick", action="store_true", help="a minute's worth of points, after a set-up that is kept")
     parser.add_argument("--long", action="store_true", help="with the largest meshes (sensitivity)")
     parser.add_argument(
-        "--seed",
-        metavar="N",
-        help="seed of random numbers, a whole number (lift-robustness, contact, surface, trocar; default 0)",
-    )
+        "--seed", metavar="N",
+        help="seed of random numbers, a whole number (for studies that draw their cases; default 0)",
+    )  # fmt: skip
     parser.add_argument("--out", metavar="DIR", help="folder of the study (default: ./studies/NAME)")
     parser.add_argument("--workers", metavar="N", help="processes on this machine (default: one for each core)")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="compute on the Dask cluster with this scheduler")
@@ -94,6 +95,8 @@ def _study(arguments: argparse.Namespace) -> Study:
         return TrocarStudy.of(arguments.quick, seed)
     if arguments.study == SurfaceStudy.name:
         return SurfaceStudy.of(arguments.quick, seed)
+    if arguments.study == VentilationStudy.name:
+        return VentilationStudy.of(arguments.quick, seed)
     return Sensitivity.of(arguments.quick, arguments.long, arguments.element or "T10")
 
 

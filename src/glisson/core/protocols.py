@@ -6,7 +6,7 @@ lab adds its own from a package of its own. Long work calls `progress` now and t
 KeyboardInterrupt and must not be swallowed.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
@@ -28,6 +28,7 @@ from glisson.core.observations import Observations
 from glisson.core.scenario import Scenario
 from glisson.core.status import Status
 from glisson.core.structures import VesselTree
+from glisson.core.tracks import Tracks
 from glisson.core.trocar import Trocar
 from glisson.core.views import ViewSet
 
@@ -261,4 +262,20 @@ class InstrumentRecogniser(Technique, Protocol):
             BadInput: the image is not of the camera's size.
             StageFailed: none is seen (unobservable), which one or where is in doubt (ambiguous), or what is seen
                 cannot be: a code that is not in the library, a mirrored image, a wheel of another size (bad_input).
+        """
+
+
+class MarkerTracker(Technique, Protocol):
+    """Follows markers through a video (entry-point group `glisson.marker_trackers`)."""
+
+    def track(self, frames: Iterable[tuple[float, NDArray[np.uint8]]], markers_px: FloatArray) -> Tracks:
+        """Tracks in px.
+
+        Args:
+            frames: times (s) and pictures [row, column, red green blue], taken one after another.
+            markers_px: places (m, 2), u right and v down, in the first of them.
+
+        Raises:
+            BadInput: a marker that is outside the image.
+            StageFailed: there are fewer than two frames.
         """

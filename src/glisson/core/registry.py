@@ -13,6 +13,7 @@ from glisson.core.parameters import build_parameters
 from glisson.core.protocols import (
     InstrumentRecogniser,
     Localiser,
+    MarkerTracker,
     MaterialLaw,
     Mesher,
     Registration,
@@ -38,6 +39,7 @@ KINDS: dict[str, tuple[str, type[Any]]] = {
     "surface-reconstructor": ("glisson.surface_reconstructors", SurfaceReconstructor),
     "localiser": ("glisson.localisers", Localiser),
     "instrument-recogniser": ("glisson.instrument_recognisers", InstrumentRecogniser),
+    "marker-tracker": ("glisson.marker_trackers", MarkerTracker),
 }
 """Kind of technique → entry-point group and protocol."""
 

@@ -1,0 +1,114 @@
+"""`glisson track`: markers followed through a laparoscope's video."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from glisson.cli.command import Command
+from glisson.cli.console import Answer
+from glisson.cli.options import pixel_from_text, positive_from_text
+from glisson.cli.progress import StageLines
+from glisson.core.errors import BadInput
+from glisson.core.status import Status
+from glisson.core.tracks import PointState
+from glisson.framework.track_figures import draw_tracks
+from glisson.framework.tracking import FINDERS, TECHNIQUE, TrackedVideo, track_video
+from glisson.intraoperative.tracks.millimetres import scaled
+from glisson.io.atomic import atomic_path
+from glisson.io.track_files import write_tracks
+from glisson.studies.page import png
+
+TRACKS, PICTURE = "tracks.csv", "tracks.png"
+COUNT = 20
+
+_KEYS = (
+    "status", "message", "frames", "seconds_of_video", "markers", "unit", "frames_per_s", "following_per_s", "notes",
+    "file", "picture", "seconds",
+)  # fmt: skip
+
+
+def add_marker_options(parser: argparse.ArgumentParser) -> None:
+    """Which markers are followed."""
+    parser.add_argument(
+        "--at",
+        metavar="U,V",
+        action="append",
+        type=pixel_from_text,
+        help="a marker's place in the first frame, px; may be repeated",
+    )
+    parser.add_argument("--find", choices=tuple(FINDERS), default="spots", help="what is looked for without --at")
+    parser.add_argument("--count", metavar="N", help=f"how many of these (default {COUNT})")
+    parser.add_argument("--technique", metavar="NAME", default=TECHNIQUE, help=f"see glisson techniques; {TECHNIQUE}")
+    parser.add_argument("--mm-per-px", metavar="MM", help="size of a pixel at the tissue; tracks are in mm then")
+
+
+def followed(video: str, arguments: argparse.Namespace, lines: StageLines) -> TrackedVideo:
+    """The markers of a video by these options, in px."""
+    if arguments.at and arguments.count:
+        raise BadInput("--count is for markers that are looked for; give it without --at.")
+    count = round(positive_from_text(arguments.count or str(COUNT), "--count"))
+    places = np.array(arguments.at) if arguments.at else None
+    progress = lines.begun("track", f"{video} is a video")
+    tracked = track_video(video, places, arguments.find, count, arguments.technique, progress)
+    lines.ended("track", len(tracked.tracks.times_s) / tracked.frames_per_s)
+    return tracked
+
+
+def _add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("video", metavar="VIDEO", help="a video file")
+    add_marker_options(parser)
+    parser.add_argument("--out", metavar="DIR", help="where tracks and picture go (default: beside the video)")
+
+
+def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
+    scale = None if arguments.mm_per_px is None else positive_from_text(arguments.mm_per_px, "--mm-per-px")
+    tracked = followed(arguments.video, arguments, lines)
+    tracks = tracked.tracks if scale is None else scaled(tracked.tracks, scale)
+    out = Path(arguments.out) if arguments.out else Path(arguments.video).parent
+    write_tracks(out / TRACKS, tracks)
+    with atomic_path(out / PICTURE) as temporary:
+        temporary.write_bytes(png(draw_tracks(tracked.tracks, tracked.first)))
+    markers = _markers(tracked)
+    values: dict[str, Any] = {
+        "status": Status.CONVERGED, "message": Status.CONVERGED.sentence, "frames": len(tracks.times_s),
+        "seconds_of_video": float(tracks.times_s[-1]), "markers": markers, "unit": tracks.unit,
+        "frames_per_s": tracked.frames_per_s, "following_per_s": tracked.following_per_s,
+        "notes": list(tracked.notes), "file": str(out / TRACKS), "picture": str(out / PICTURE),
+        "seconds": len(tracks.times_s) / tracked.frames_per_s,
+    }  # fmt: skip
+    whole = sum(marker["seen"] == 1.0 for marker in markers)
+    text = [
+        f"markers   {len(markers)}, {whole} of them seen in all of {len(tracks.times_s)} frames",
+        f"speed     {tracked.frames_per_s:.0f} frames per second; {tracked.following_per_s:.0f} without decoding",
+        *(f"look at   {note}" for note in tracked.notes),
+        f"written   {out / TRACKS} and {out / PICTURE}",
+    ]
+    return Answer(values, "\n".join(text))
+
+
+def _markers(tracked: TrackedVideo) -> list[dict[str, Any]]:
+    tracks = tracked.tracks
+    sigma = np.sqrt(np.trace(tracks.covariance, axis1=2, axis2=3) / 2.0)
+    return [
+        {
+            "marker": n + 1,
+            "first_px": tracks.places[0, n].tolist(),
+            "seen": float(tracks.seen[:, n].mean()),
+            "lost_times": int((tracks.states[:, n] == PointState.FOUND_AGAIN).sum()),
+            "sigma_px": float(np.nanmedian(sigma[:, n])),
+        }
+        for n in range(tracks.states.shape[1])
+    ]
+
+
+COMMAND = Command(
+    "track",
+    "  glisson track liver.mp4\n"
+    "  glisson track liver.mp4 --at 312,200 --at 460,188 --mm-per-px 0.14 --out tracks --json\n"
+    "  glisson track liver.mp4 --find corners --count 40",
+    _add_arguments,
+    _run,
+    _KEYS,
+)

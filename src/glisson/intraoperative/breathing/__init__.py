@@ -1,0 +1,1 @@
+"""What the lungs do to markers on the liver, and how that is taken away again."""

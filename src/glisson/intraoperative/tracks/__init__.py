@@ -1,0 +1,1 @@
+"""Markers on tissue followed through a video."""

@@ -1,0 +1,1 @@
+"""What breathing and ventilation do to markers, from videos with exact truth."""
