@@ -10,7 +10,15 @@ from glisson.cli.console import Answer
 from glisson.core.arrays import FloatArray
 from glisson.core.status import Status
 from glisson.core.transform import RigidTransform
-from glisson.framework.calibrating import BOARD, CAMERA, CAMERA_PICTURE, HAND_EYE, HAND_EYE_PICTURE, BoardImages
+from glisson.framework.calibrating import (
+    BOARD,
+    CAMERA,
+    CAMERA_PICTURE,
+    HAND_EYE,
+    HAND_EYE_CAMERA,
+    HAND_EYE_PICTURE,
+    BoardImages,
+)
 from glisson.intraoperative.cameras.calibration import CameraCalibration
 from glisson.intraoperative.cameras.hand_eye import HandEye
 from glisson.intraoperative.cameras.pivot import Pivot
@@ -57,7 +65,8 @@ def hand_eye_answer(made: HandEye, boards: BoardImages, folder: Path, upside_dow
         "rms_px_of_views": dict(zip((view.name for view in boards.views), made.rms_px_of_views, strict=True)),
         "sigma_px": made.sigma_px, "tracker_sigma_deg": made.tracker_sigma_deg,
         "tracker_sigma_mm": made.tracker_sigma_mm, "turned_deg": list(made.turned_deg), "notes": notes,
-        "file": str(folder / HAND_EYE), "board_file": str(folder / BOARD), "picture": str(folder / HAND_EYE_PICTURE),
+        "file": str(folder / HAND_EYE), "board_file": str(folder / BOARD),
+        "camera_file": str(folder / HAND_EYE_CAMERA), "picture": str(folder / HAND_EYE_PICTURE),
     }  # fmt: skip
     pose = made.camera_from_marker
     text = [
@@ -65,7 +74,7 @@ def hand_eye_answer(made: HandEye, boards: BoardImages, folder: Path, upside_dow
         f"turn         known to {float(np.degrees(_sigma(pose)[:3].max())):.2f}°",
         f"residual     {made.rms_px:.2f} px, {made.rms_mm:.2f} mm, {made.rms_deg:.2f}° over {len(boards.views)} views",
         f"tracker      {made.tracker_sigma_mm:.2f} mm, {made.tracker_sigma_deg:.3f}° as the residuals show it",
-        f"written      {folder / HAND_EYE}, {folder / BOARD} and {folder / HAND_EYE_PICTURE}",
+        f"written      {folder / HAND_EYE}, and beside it {BOARD}, {HAND_EYE_CAMERA} and {HAND_EYE_PICTURE}",
     ]
     return Answer(values, "\n".join(text + _look_at(notes)))
 

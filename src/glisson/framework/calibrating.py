@@ -25,6 +25,7 @@ from glisson.io.tables import read_points
 
 CAMERA = "camera.toml"
 HAND_EYE = "hand-eye.toml"
+HAND_EYE_CAMERA = "hand-eye-camera.toml"
 BOARD = "board.toml"
 CAMERA_PICTURE = "camera.png"
 HAND_EYE_PICTURE = "hand-eye.png"
@@ -126,7 +127,7 @@ def camera_from_boards(boards: BoardImages, size: tuple[int, int] | None, folder
 def hand_eye_from_boards(
     camera: Camera, boards: BoardImages, poses: Sequence[str], board_poses: Sequence[str], folder: Path
 ) -> HandEye:
-    """Calibrate hand and eye; writes `hand-eye.toml`, `board.toml` and a picture of the residuals into a folder.
+    """Calibrate hand and eye; writes both poses, the corrected camera and a picture of the residuals into a folder.
 
     Args:
         camera: the calibrated camera.
@@ -152,6 +153,7 @@ def hand_eye_from_boards(
     made = calibrate_hand_eye(camera, views)
     write_pose(folder / HAND_EYE, made.camera_from_marker)
     write_pose(folder / BOARD, made.base_from_board)
+    write_camera(folder / HAND_EYE_CAMERA, made.camera)
     shown = [
         Shown(view.name, image, view.pixels, residuals, np.ones(len(residuals), dtype=np.bool_))
         for view, image, residuals in zip(boards.views, boards.images, made.residuals_px, strict=True)
