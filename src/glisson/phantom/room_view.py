@@ -2,6 +2,7 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
 
 from glisson.core.arrays import FloatArray
 from glisson.core.camera import Camera
@@ -13,7 +14,6 @@ from glisson.phantom.photograph import Sensor, photographed
 from glisson.phantom.room_scene import Patch, Scene
 
 _SAMPLES = 4
-_ORDER = np.array([0, 3, 12, 15, 1, 2, 4, 5, 6, 7, 8, 9, 10, 11, 13, 14])
 _MARGIN_PX = 3
 
 
@@ -23,6 +23,7 @@ class RoomViews:
     def __init__(self, camera: Camera) -> None:
         self.camera = camera
         self._slopes = sensor_slopes(camera)
+        self._widest = 1.3 * np.abs(self._slopes).max(axis=(0, 1))
 
     def view(
         self, scene: Scene, room_from_camera: RigidTransform, sensor: Sensor, rng: np.random.Generator
@@ -34,9 +35,10 @@ class RoomViews:
         """What falls on the sensor, 1 is white; sheets are sampled by 16 rays for each pixel."""
         rotation, centre = room_from_camera.rotation, room_from_camera.translation_mm
         lit = (scene.gradient, scene.tint)
-        light = _room_light(
+        light, covered = _room_light(
             self._slopes, rotation, centre, scene.size_mm, scene.wall_colours, scene.rods, scene.rod_colours, *lit
         )
+        near_rods = maximum_filter(covered, 5)
         for patch in scene.patches:
             window = self._window(patch, room_from_camera)
             if window is not None:
@@ -44,7 +46,7 @@ class RoomViews:
                 sizes = np.array([*patch.half_mm, patch.cross_mm])
                 seed = int(rng.integers(2**31))
                 own = (window, rotation, centre, plane, sizes, patch.colours)
-                _add_patch(light, self._slopes, *own, scene.rods, *lit, scene.glare, seed)
+                _add_patch(light, self._slopes, *own, scene.rods, near_rods, *lit, scene.glare, seed)
         return light
 
     def visible(self, scene: Scene, cross: Cross, room_from_camera: RigidTransform) -> bool:
@@ -77,8 +79,7 @@ class RoomViews:
         # Far outside the image the distortion's polynomial comes back into it. The steps are smaller than what is kept
         # beyond the image, so that no part within it is lost.
         slopes = np.abs(in_camera[:, :2] / np.maximum(in_camera[:, 2:], 1e-6))
-        limit = 1.3 * np.abs(self._slopes).max(axis=(0, 1))
-        near = (in_camera[:, 2] > 1.0) & (slopes < limit).all(axis=1)
+        near = (in_camera[:, 2] > 1.0) & (slopes < self._widest).all(axis=1)
         if not near.any():
             return None
         pixels = seen_at(self.camera, in_camera[near])
@@ -136,10 +137,10 @@ def _shine(x: float, y: float, z: float, glare: FloatArray) -> float:
 def _room_light(
     slopes: FloatArray, rotation: FloatArray, centre: FloatArray, size: FloatArray, walls: FloatArray,
     rods: FloatArray, rod_colours: FloatArray, gradient: FloatArray, tint: FloatArray,
-) -> FloatArray:  # fmt: skip
-    """The picture of walls and rods, one ray for each pixel."""
+) -> tuple[FloatArray, NDArray[np.uint8]]:  # fmt: skip
+    """The picture of walls and rods, one ray for each pixel, and where there are rods."""
     height, width = slopes.shape[:2]
-    light = np.zeros((height, width, 3))
+    light, covered = np.zeros((height, width, 3)), np.zeros((height, width), dtype=np.uint8)
     low, high = np.array([-size[0] / 2.0, -size[1] / 2.0, 0.0]), np.array([size[0] / 2.0, size[1] / 2.0, size[2]])
     ray = np.zeros(3)
     for row in range(height):
@@ -157,18 +158,22 @@ def _room_light(
                 level += (centre[k] + nearest * ray[k]) * gradient[k]
             level = max(level, 0.2)
             rod = _first_rod(centre[0], centre[1], centre[2], ray[0], ray[1], ray[2], rods, nearest)
+            covered[row, column] = 1 if rod >= 0 else 0
             for k in range(3):
                 light[row, column, k] = (rod_colours[rod, k] if rod >= 0 else walls[side, k]) * level * tint[k]
-    return light
+    return light, covered
 
 
 @compiled
 def _add_patch(
     light: FloatArray, slopes: FloatArray, window: NDArray[np.int64], rotation: FloatArray, centre: FloatArray,
-    plane: FloatArray, sizes: FloatArray, colours: FloatArray, rods: FloatArray,
+    plane: FloatArray, sizes: FloatArray, colours: FloatArray, rods: FloatArray, near_rods: NDArray[np.uint8],
     gradient: FloatArray, tint: FloatArray, glare: FloatArray, seed: int,
 ) -> None:  # fmt: skip
-    """Put a sheet into the picture; rays are spread at random within a pixel's 16 parts, which has no bias."""
+    """Put a sheet into the picture; rays are spread at random within a pixel's 16 parts, which has no bias.
+
+    `near_rods` is 1 where a rod may be seen.
+    """
     np.random.seed(seed)  # noqa: NPY002 - numba has no generators that are seeded inside
     height, width = slopes.shape[:2]
     # The ray (x, y, 1) of the camera in the frame of the sheet: across, along and towards it.
@@ -178,37 +183,45 @@ def _add_patch(
     seen = np.zeros(3)
     for row in range(window[0], window[1] + 1):
         for column in range(window[2], window[3] + 1):
-            seen[:] = 0.0
-            met = 0
             east, west = min(column + 1, width - 1), max(column - 1, 0)
             south, north = min(row + 1, height - 1), max(row - 1, 0)
             xu = (slopes[row, east, 0] - slopes[row, west, 0]) / (east - west)
             yu = (slopes[row, east, 1] - slopes[row, west, 1]) / (east - west)
             xv = (slopes[south, column, 0] - slopes[north, column, 0]) / (south - north)
             yv = (slopes[south, column, 1] - slopes[north, column, 1]) / (south - north)
-            rays, square, same = 0, -1, True
-            for turn in range(_SAMPLES * _SAMPLES):
-                # The outermost parts come first: where they see the same, so do those between them.
-                if turn == 4 and same:
-                    break
-                part = _ORDER[turn]
-                rays += 1
-                u = (part % _SAMPLES + np.random.random()) / _SAMPLES - 0.5  # noqa: NPY002
-                v = (part // _SAMPLES + np.random.random()) / _SAMPLES - 0.5  # noqa: NPY002
-                x = slopes[row, column, 0] + u * xu + v * xv
-                y = slopes[row, column, 1] + u * yu + v * yv
-                towards = turned[2, 0] * x + turned[2, 1] * y + turned[2, 2]
-                reach = -from_middle[2] / max(towards, 1e-9)
+            # Where a pixel's corners see the same square, and no rod is near, one ray will do.
+            first, same = -2, True
+            for corner in range(4):
+                u, v = corner % 2 - 0.5, corner // 2 - 0.5
+                x, y = slopes[row, column, 0] + u * xu + v * xv, slopes[row, column, 1] + u * yu + v * yv
+                reach = -from_middle[2] / max(turned[2, 0] * x + turned[2, 1] * y + turned[2, 2], 1e-9)
                 across = from_middle[0] + reach * (turned[0, 0] * x + turned[0, 1] * y + turned[0, 2])
                 along = from_middle[1] + reach * (turned[1, 0] * x + turned[1, 1] * y + turned[1, 2])
-                before, square = square, _square(across, along, sizes)
+                square = _square(across, along, sizes)
+                same = same and (corner == 0 or square == first)
+                first = square
+            if same and first < 0:
+                continue
+            alone = same and near_rods[row, column] == 0
+            rays = 1 if alone else _SAMPLES * _SAMPLES
+            met = 0
+            seen[:] = 0.0
+            for part in range(rays):
+                u, v = 0.0, 0.0
+                if not alone:
+                    u = (part % _SAMPLES + np.random.random()) / _SAMPLES - 0.5  # noqa: NPY002
+                    v = (part // _SAMPLES + np.random.random()) / _SAMPLES - 0.5  # noqa: NPY002
+                x, y = slopes[row, column, 0] + u * xu + v * xv, slopes[row, column, 1] + u * yu + v * yv
+                reach = -from_middle[2] / max(turned[2, 0] * x + turned[2, 1] * y + turned[2, 2], 1e-9)
+                across = from_middle[0] + reach * (turned[0, 0] * x + turned[0, 1] * y + turned[0, 2])
+                along = from_middle[1] + reach * (turned[1, 0] * x + turned[1, 1] * y + turned[1, 2])
+                square = _square(across, along, sizes)
                 rx = rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2]
                 ry = rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2]
                 rz = rotation[2, 0] * x + rotation[2, 1] * y + rotation[2, 2]
-                if square >= 0 and _first_rod(centre[0], centre[1], centre[2], rx, ry, rz, rods, reach) >= 0:
-                    square = -1
-                same = same and (turn == 0 or before == square)
-                if square < 0:
+                if square < 0 or (
+                    not alone and _first_rod(centre[0], centre[1], centre[2], rx, ry, rz, rods, reach) >= 0
+                ):
                     continue
                 met += 1
                 px, py, pz = centre[0] + reach * rx, centre[1] + reach * ry, centre[2] + reach * rz
