@@ -21,7 +21,7 @@ _NEAR_PX = 1.2
 _LEAST_ARC = 0.3
 _FLATTEST = 0.6
 """Instruments lean by a few degrees only, so that wheels look round."""
-_GOOD_SCORE = 0.4
+_GOOD_SCORE, _SURE_SCORE = 0.4, 0.75
 _ANGLES = 72
 
 
@@ -54,13 +54,15 @@ def find_wheel(paper: NDArray[np.float32]) -> FoundEllipse | None:
         ellipse = _ellipse_of(outline, rng)
         if ellipse is None:
             continue
-        # An outline of the white ring is its outer or its inner edge.
-        for share in (RINGS.white, RINGS.outer):
+        # An outline is an edge of the outer white ring or of the inner one, of which more may be free.
+        for share in (RINGS.white, RINGS.outer, RINGS.inner):
             middle, axes, angle = ellipse
             found = FoundEllipse(middle, axes * RINGS.white / share, angle, 0.0)
             score = _score(paper, found)
             if score > (best.score if best else _GOOD_SCORE):
                 best = FoundEllipse(found.middle, found.half_axes, angle, score)
+        if best is not None and best.score > _SURE_SCORE:
+            break
     return best
 
 
