@@ -16,7 +16,7 @@ _OVER = 6.0
 """Paper is brighter than the mean about it by so many grey levels."""
 _LEAST_PX = 20
 _LEAST_POINTS = 40
-_TRIES = 40
+_TRIES = 100
 _NEAR_PX = 1.2
 _LEAST_ARC = 0.3
 _FLATTEST = 0.6
@@ -85,7 +85,7 @@ def _ellipse_of(outline: FloatArray, rng: np.random.Generator) -> tuple[FloatArr
     best: NDArray[np.bool_] | None = None
     for _ in range(_TRIES):
         # Points of one stretch are on one arc more often than points from anywhere.
-        begin, stretch = rng.integers(len(points)), int(len(points) * rng.uniform(0.3, 1.0))
+        begin, stretch = rng.integers(len(points)), max(12, int(len(points) * rng.uniform(0.1, 1.0)))
         chosen = (begin + rng.choice(stretch, 6, replace=False)) % len(points)
         near = _near(points, cv2.fitEllipseDirect(points[chosen]))
         if near is not None and (best is None or near.sum() > best.sum()):
