@@ -141,6 +141,15 @@ def test_the_camera_s_own_error_is_in_the_tip_s(views):
     assert np.trace(more) > np.trace(sure) + 0.05
 
 
+def test_a_camera_s_gamma_moves_edges_but_not_the_wheel(views):
+    """Gamma lets white grow by nearly half a pixel over each edge."""
+    scene = plain_scene()
+    bright = np.rint(255.0 * (views.view(scene) / 255.0) ** (1.0 / 2.2)).astype(np.uint8)
+    seen = RECOGNISER.recognise(bright, TROCAR, LIBRARY)
+    away = float(np.linalg.norm(scene.trocar_from_instrument.translation_mm))
+    assert seen.distance_mm == pytest.approx(away, abs=0.1)
+
+
 def test_a_tip_in_the_room_has_both_errors(views):
     seen = RECOGNISER.recognise(views.view(plain_scene()), TROCAR, LIBRARY)
     covariance = np.diag([1e-6, 1e-6, 1e-6, 0.04, 0.04, 0.04])
