@@ -43,6 +43,6 @@ def views():
     return RoomViews(CAMERA)
 
 
-def view(crosses, room_from_trocar, seed=0, sensor=None):
+def view(crosses, room_from_trocar, seed=0, gamma=1.0):
     rng = np.random.default_rng(seed)
-    return views().view(bare_scene(ROOM, crosses), room_from_trocar, sensor or Sensor(), rng)
+    return views().view(bare_scene(ROOM, crosses), room_from_trocar, Sensor(), rng, gamma)

@@ -121,9 +121,13 @@ def test_a_stroke_is_an_observation_with_covariance():
 
 @pytest.mark.parametrize(
     ("change", "sentence"),
-    [({"times_s": [0.0, 0.0]}, "grow"), ({"frame": "moon"}, "frame"),
-     ({"covariance_mm2": np.zeros((2, 3, 3))}, "definite"), ({"points_mm": [[0.0, 0.0, np.nan], [0.0, 0.0, 0.0]]}, "not finite")],
-)  # fmt: skip
+    [
+        ({"times_s": [0.0, 0.0]}, "grow"),
+        ({"frame": "moon"}, "frame"),
+        ({"covariance_mm2": np.zeros((2, 3, 3))}, "definite"),
+        ({"points_mm": [[0.0, 0.0, np.nan], [0.0, 0.0, 0.0]]}, "not finite"),
+    ],
+)
 def test_tracks_that_cannot_be(change, sentence):
     good = {"times_s": [0.0, 1.0], "frame": "trocar", "points_mm": np.zeros((2, 3)), "covariance_mm2": [np.eye(3)] * 2}
     with pytest.raises(BadInput, match=sentence):

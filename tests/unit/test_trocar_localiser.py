@@ -38,13 +38,14 @@ def test_the_renderer_shows_colours_where_opencv_projects_them():
                 assert np.allclose(light[v, u], colour, atol=1e-9)
 
 
+@pytest.mark.parametrize("gamma", [1.0, 2.2])
 @pytest.mark.parametrize("technique", ["global", "guess-database"])
-def test_poses_from_pixels(technique):
+def test_poses_from_pixels(technique, gamma):
     localiser = make_technique("localiser", technique, {}, "test")
     layout = trocar_views.layout()
     for seed in range(6):
         true = trocar_views.pose(seed)
-        found = localiser.localise(trocar_views.view(layout, true, seed), CAMERA, layout)
+        found = localiser.localise(trocar_views.view(layout, true, seed, gamma), CAMERA, layout)
         assert found.status is Status.CONVERGED
         assert np.linalg.norm(found.room_from_trocar.translation_mm - true.translation_mm) < found.position_bound_mm < 5
         turned = Rotation.from_matrix(found.room_from_trocar.rotation @ true.rotation.T).magnitude()
@@ -63,6 +64,17 @@ def test_a_room_in_use_is_right_or_flagged(localiser):
             good += 1
             assert np.linalg.norm(found.room_from_trocar.translation_mm - true.translation_mm) < 5.0
     assert good >= 5
+
+
+def test_ink_that_has_grown_is_told_from_a_pose_that_is_off(localiser):
+    layout, true = trocar_views.layout(), trocar_views.pose(2)
+    noises, counts = [], []
+    for gamma in (1.0, 2.2):
+        found = localiser.localise(trocar_views.view(layout, true, 2, gamma), CAMERA, layout)
+        noises.append(found.noise_px)
+        counts.append(len(found.corners_px))
+    assert noises[1] < 1.5 * noises[0]
+    assert counts[1] >= 0.95 * counts[0]
 
 
 def test_edges_are_measured_to_hundredths_of_a_pixel(localiser):

@@ -11,11 +11,12 @@ from glisson.core.instruments import RINGS, SeenInstrument
 from glisson.core.trocar import Trocar
 from glisson.intraoperative.cameras.projection import project
 from glisson.intraoperative.instruments.timeline import Use
-from glisson.navigation.figures.colours import BLACK, BLUE, ORANGE, SKY, VERMILLION
+from glisson.navigation.figures.colours import BLACK, BLUE, SKY, VERMILLION
 from glisson.navigation.figures.picture import new_figure
 
 _HEAD_PX = 64
 _OUTLINED = [withStroke(linewidth=3, foreground="white")]
+_DARKENED = [withStroke(linewidth=4, foreground="black")]
 _ROW_PX, _FOOT_PX = 44, 70
 
 
@@ -34,7 +35,7 @@ def draw_instrument(image: NDArray[np.uint8], trocar: Trocar, seen: SeenInstrume
     axes.plot(*project(camera, pose, [[0.0, 0.0, 0.0], [1.25 * radius, 0.0, 0.0]]).T, color=VERMILLION, lw=2.0)
     # The axis up to half-way to the camera, beside which it passes.
     towards = np.linspace(0.0, 0.5 * seen.distance_mm, 30)[:, None] * [0.0, 0.0, 1.0]
-    axes.plot(*project(camera, pose, towards).T, color=ORANGE, lw=2.0, ls="dashed")
+    axes.plot(*project(camera, pose, towards).T, color="white", lw=2.0, ls="dashed", path_effects=_DARKENED)
     u, v = project(camera, pose, [[0.0, -1.2 * radius, 0.0]])[0]
     u, v = np.clip(u, 10.0, camera.width - 200.0), np.clip(v, 20.0, camera.height - 20.0)
     axes.text(u, v, seen.instrument.name, fontsize=16, color=BLACK, path_effects=_OUTLINED)
@@ -45,7 +46,7 @@ def draw_instrument(image: NDArray[np.uint8], trocar: Trocar, seen: SeenInstrume
         figure,
         f"{seen.instrument.name}: wheel {seen.distance_mm:.1f} mm away, {np.degrees(seen.angle_rad):.2f}° from the "
         f"channel, tip ({x:.1f}, {y:.1f}, {z:.1f}) ± {sigma:.1f} mm",
-        "blue: the wheel as the pose predicts it; red: where its first sector begins; orange: the axis towards the tip",
+        "blue: the wheel as the pose predicts it; red: where its first sector begins; white: the axis towards the tip",
     )
     return _pixels(figure)
 

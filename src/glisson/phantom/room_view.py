@@ -1,8 +1,10 @@
 """Rendered views of a room, pixel by pixel along the rays of `optics`."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter
+from scipy.ndimage import gaussian_filter, maximum_filter
 
 from glisson.core.arrays import FloatArray
 from glisson.core.camera import Camera
@@ -26,10 +28,18 @@ class RoomViews:
         self._widest = 1.3 * np.abs(self._slopes).max(axis=(0, 1))
 
     def view(
-        self, scene: Scene, room_from_camera: RigidTransform, sensor: Sensor, rng: np.random.Generator
+        self,
+        scene: Scene,
+        room_from_camera: RigidTransform,
+        sensor: Sensor,
+        rng: np.random.Generator,
+        gamma: float = 1.0,
     ) -> NDArray[np.uint8]:
-        """The picture [row, column, red green blue] from a pose."""
-        return photographed(self.light(scene, room_from_camera, rng), sensor, rng)
+        """The picture [row, column, red green blue] from a pose; its levels are the light's to the power 1 / gamma."""
+        light = self.light(scene, room_from_camera, rng)
+        # The lens blurs light, not levels.
+        blurred = gaussian_filter(light, (sensor.blur_px, sensor.blur_px, 0.0), mode="nearest")
+        return photographed(np.clip(blurred, 0.0, 1.0) ** (1.0 / gamma), replace(sensor, blur_px=0.0), rng)
 
     def light(self, scene: Scene, room_from_camera: RigidTransform, rng: np.random.Generator) -> FloatArray:
         """What falls on the sensor, 1 is white; sheets are sampled by 16 rays for each pixel."""

@@ -4,6 +4,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 
+import numpy as np
+
 from glisson.core.errors import BadInput, StageFailed
 from glisson.core.instruments import SECTORS, WHEEL_COLOURS, Instrument, InstrumentLibrary
 from glisson.core.status import Status
@@ -53,15 +55,18 @@ def free_code(library: InstrumentLibrary) -> tuple[str, ...]:
     Raises:
         BadInput: no code is left that can be told from all others.
     """
-    best, apart = None, LEAST_APART - 1
-    for colours in product(WHEEL_COLOURS, repeat=SECTORS):
-        own = [_differing(colours, way) for way in (*list(_turned(colours))[1:], *_turned(colours[::-1]))]
-        others = [_differing(colours, way) for one in library.instruments for way in _either_way(one.colours)]
-        if min(own) >= LEAST_APART and min(others, default=SECTORS) > apart:
-            best, apart = colours, min(others, default=SECTORS)
-    if best is None:
+    codes = np.array(list(product(range(len(WHEEL_COLOURS)), repeat=SECTORS)))
+    turns = range(SECTORS)
+    ways = [np.roll(codes[:, ::step], turn, axis=1) for step in (1, -1) for turn in turns]
+    own = np.min([(codes != way).sum(axis=1) for way in ways[1:]], axis=0)
+    others = np.full(len(codes), SECTORS)
+    for one in library.instruments:
+        numbers = np.array([WHEEL_COLOURS.index(colour) for colour in one.colours])
+        others = np.minimum(others, np.min([(way != numbers).sum(axis=1) for way in ways], axis=0))
+    best = int(np.argmax(np.where(own >= LEAST_APART, others, -1)))
+    if own[best] < LEAST_APART or others[best] < LEAST_APART:
         raise BadInput("No colour code is left that can be told from all others in the library.")
-    return best
+    return tuple(WHEEL_COLOURS[number] for number in codes[best])
 
 
 def instrument_of(reading: Reading, library: InstrumentLibrary) -> tuple[Instrument, int]:

@@ -52,6 +52,16 @@ def read_sectors(
     return tuple(_colour(counts[:, sector], wide * _RADII) for sector in range(SECTORS)), float(np.radians(begin))
 
 
+def paper_colour(
+    image: NDArray[np.uint8], camera: Camera, trocar_from_wheel: RigidTransform, radius_mm: float
+) -> FloatArray:
+    """What the wheel's white paper looks like (3,): the brighter half of its outer ring."""
+    ring = _white_ring(image, camera, trocar_from_wheel, radius_mm)
+    brightness = ring.min(axis=1)
+    colour: FloatArray = np.median(ring[brightness >= np.median(brightness)], axis=0).clip(1.0)
+    return colour
+
+
 def _colour(counts: NDArray[np.intp], all_of_it: int) -> str | None:
     readable, most = counts.sum(), counts.max()
     if readable < _READABLE * all_of_it or most < _SURE * readable:
@@ -64,7 +74,7 @@ def _labels(image: NDArray[np.uint8], camera: Camera, pose: RigidTransform, radi
     margin = 0.2 * (RINGS.outer - RINGS.inner)
     radii = np.linspace(RINGS.inner + margin, RINGS.outer - margin, _RADII)
     ink = _seen(image, camera, pose, radii * radius_mm)
-    white = _white(_seen(image, camera, pose, np.array([0.5 * (RINGS.white + RINGS.outer)]) * radius_mm)[0])
+    white = _white(_white_ring(image, camera, pose, radius_mm))
     shares = ink / white
     value, least = shares.max(axis=2), shares.min(axis=2)
     chroma = np.maximum(value - least, 1e-6)
@@ -77,6 +87,12 @@ def _labels(image: NDArray[np.uint8], camera: Camera, pose: RigidTransform, radi
     bright = value > np.array(list(_LEAST_VALUE.values()))[labels]
     clear = (off.min(axis=0) < _NEAR_HUE) & bright & (chroma > _LEAST_SATURATION * value)
     return np.where(clear, labels, -1)
+
+
+def _white_ring(image: NDArray[np.uint8], camera: Camera, pose: RigidTransform, radius_mm: float) -> FloatArray:
+    """The image (degrees, 3) in the middle of the outer white ring."""
+    ring: FloatArray = _seen(image, camera, pose, np.array([0.5 * (RINGS.white + RINGS.outer)]) * radius_mm)[0]
+    return ring
 
 
 def _white(ring: FloatArray) -> FloatArray:

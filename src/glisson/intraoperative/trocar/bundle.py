@@ -1,18 +1,19 @@
 """Bundle adjustment of crosses and views (Triggs et al. 2000): poses of both and a common factor of the sizes."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from glisson.core.arrays import FloatArray
 from glisson.core.camera import Camera
-from glisson.core.crosses import CrossLayout, unit_corners
+from glisson.core.crosses import COLOURS, CrossLayout, unit_corners
 from glisson.core.errors import StageFailed
 from glisson.core.status import Status
 from glisson.core.transform import RigidTransform, cross_matrix
 from glisson.intraoperative.cameras.projection import project_with_jacobian
 from glisson.intraoperative.trocar.corners import SeenCorners
+from glisson.intraoperative.trocar.growth import LIKELY_GROWTH_PX
 from glisson.intraoperative.trocar.refinement import turn
 
 _ITERATIONS = 60
@@ -22,12 +23,17 @@ _ROBUST = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Bundle:
-    """Corners of each view, `camera_from_room` of each, and `room_from_cross` of each cross of the layout."""
+    """Corners of each view, `camera_from_room` of each, and `room_from_cross` of each cross of the layout.
+
+    Unknowns are the poses of all crosses but the first, of all views, the factor of the sizes, and how far each ink
+    seems to have grown.
+    """
 
     views: Sequence[SeenCorners]
     poses: Sequence[RigidTransform]
     places: Sequence[RigidTransform]
     size_factor: float = 1.0
+    growth_px: FloatArray = field(default_factory=lambda: np.zeros(len(COLOURS)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,13 +75,14 @@ def _told(bundle: Bundle, camera: Camera, layout: CrossLayout, known: tuple[int,
     cost, normal, _, errors = _equations(bundle, camera, layout, known)
     freedom = max(2 * len(errors) + 1 - len(normal), 1)
     covariance = np.linalg.inv(normal) * max(1.0, cost / freedom)
+    size_sigma = float(np.sqrt(covariance[-1 - len(COLOURS), -1 - len(COLOURS)]))
     count = len(bundle.places)
     of_places = np.zeros((6 * count, 6 * count))
     of_places[6:, 6:] = covariance[: 6 * count - 6, : 6 * count - 6]
     designed = [cross.room_from_cross for cross in layout.crosses]
     residual = float(np.sqrt(np.mean(errors**2)) * camera.focal_px.mean())
     places = in_frame_of(designed, bundle.places, of_places)
-    return Adjusted(places, bundle.size_factor, float(np.sqrt(covariance[-1, -1])), residual)
+    return Adjusted(places, bundle.size_factor, size_sigma, residual)
 
 
 def in_frame_of(
@@ -115,11 +122,12 @@ def in_frame_of(
 
 
 def _moved(bundle: Bundle, step: FloatArray) -> Bundle:
-    """The bundle after a step: all crosses but the first, all views, the factor."""
+    """The bundle after a step."""
     crosses = 6 * (len(bundle.places) - 1)
     places = [_stepped(place, step[6 * n : 6 * n + 6]) for n, place in enumerate(bundle.places[1:])]
     poses = [_stepped(pose, step[crosses + 6 * v : crosses + 6 * v + 6]) for v, pose in enumerate(bundle.poses)]
-    return Bundle(bundle.views, poses, [bundle.places[0], *places], bundle.size_factor + float(step[-1]))
+    factor = bundle.size_factor + float(step[-1 - len(COLOURS)])
+    return Bundle(bundle.views, poses, [bundle.places[0], *places], factor, bundle.growth_px + step[-len(COLOURS) :])
 
 
 def _stepped(pose: RigidTransform, step: FloatArray) -> RigidTransform:
@@ -131,7 +139,7 @@ def _equations(
 ) -> tuple[float, FloatArray, FloatArray, FloatArray]:
     """Robust squared error, normal matrix and gradient over all unknowns, and the errors (n, 2) of the slopes."""
     crosses = 6 * (len(bundle.places) - 1)
-    size = crosses + 6 * len(bundle.poses) + 1
+    size = crosses + 6 * len(bundle.poses) + 1 + len(COLOURS)
     normal, gradient, cost = np.zeros((size, size)), np.zeros(size), 0.0
     errors = []
     slopes_of = Camera(camera.width, camera.height, np.ones(2), np.zeros(2))
@@ -143,15 +151,16 @@ def _equations(
             turned = np.column_stack([flat, np.zeros(len(flat))]) @ place.rotation.T
             arms = turned * bundle.size_factor
             seen, by_all = project_with_jacobian(slopes_of, pose, arms + place.translation_mm)
-            off = seen - view.slopes[rows]
+            growth = np.zeros((len(flat), 2, len(COLOURS))) if view.growth is None else view.growth[rows]
+            off = seen + growth @ bundle.growth_px - view.slopes[rows]
             by_point = by_all[:, :, 3:6] @ pose.rotation
             columns = [crosses + 6 * v + k for k in range(6)]
             jacobian = [by_all[:, :, :6]]
             if number > 0:
                 columns += [6 * (number - 1) + k for k in range(6)]
                 jacobian += [by_point @ -np.array([cross_matrix(arm) for arm in arms]), by_point]
-            columns.append(size - 1)
-            jacobian.append(by_point @ turned[:, :, None])
+            columns += range(size - 1 - len(COLOURS), size)
+            jacobian += [by_point @ turned[:, :, None], growth]
             by_unknowns = np.concatenate(jacobian, axis=2)
             information = view.information[rows]
             squares = np.einsum("ni,nij,nj->n", off, information, off)
@@ -163,6 +172,10 @@ def _equations(
             gradient[columns] += np.einsum("nik,ni->k", weighted, off)
             errors.append(off)
     cost += _add_distance(bundle, known, normal, gradient)
+    last = slice(size - len(COLOURS), size)
+    normal[last, last] += np.eye(len(COLOURS)) / LIKELY_GROWTH_PX**2
+    gradient[last] += bundle.growth_px / LIKELY_GROWTH_PX**2
+    cost += float(np.sum((bundle.growth_px / LIKELY_GROWTH_PX) ** 2))
     return cost, normal, gradient, np.concatenate(errors)
 
 

@@ -1,6 +1,7 @@
 """Corners of crosses as they were measured in an image."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +22,8 @@ class SeenCorners:
         pixels: in the image (n, 2).
         slopes: x / z and y / z of their rays in the camera's frame (n, 2).
         information: inverse covariance of the slopes (n, 2, 2).
+        growth: derivative (n, 2, 4) of the slopes by how far each colour's ink has grown, per px, if that is in them.
+        growth_covariance: what is left open of that (4, 4), px².
     """
 
     cross: IntArray
@@ -29,18 +32,30 @@ class SeenCorners:
     pixels: FloatArray
     slopes: FloatArray
     information: FloatArray
+    growth: FloatArray | None = None
+    growth_covariance: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.cross)
 
     def of(self, chosen: "np.typing.NDArray[np.bool_]") -> "SeenCorners":
         """Some of them (n,)."""
-        return SeenCorners(*(values[chosen] for values in vars(self).values()))
+        growth = None if self.growth is None else self.growth[chosen]
+        names = ("cross", "corner", "points_mm", "pixels", "slopes", "information")
+        return replace(self, growth=growth, **{name: getattr(self, name)[chosen] for name in names})
 
     @property
     def crosses(self) -> list[int]:
         """Numbers of the crosses that they belong to, sorted."""
         return sorted({int(number) for number in self.cross})
+
+
+def joined(parts: Sequence[SeenCorners]) -> SeenCorners:
+    """Corners of one image that were measured apart, all with their derivative by the growth."""
+    growths = [part.growth for part in parts if part.growth is not None]
+    names = ("cross", "corner", "points_mm", "pixels", "slopes", "information")
+    values = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    return SeenCorners(**values, growth=np.concatenate(growths))
 
 
 def corners_at(

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from glisson.core.parameters import parameter
 from glisson.core.status import Status
 from glisson.core.transform import RigidTransform
 from glisson.intraoperative.trocar.corners import SeenCorners, corners_at
+from glisson.intraoperative.trocar.growth import without_growth
 from glisson.intraoperative.trocar.measurement import measure_corners
 from glisson.intraoperative.trocar.outlines import cross_outlines
 from glisson.intraoperative.trocar.pose import FoundPose
@@ -24,8 +25,12 @@ from glisson.intraoperative.trocar.sizes import other_size
 _OUTLINE_PX = 1.0
 """Standard deviation of an outline's corner."""
 
-_REACHES_PX = (5.0, 3.0)
-"""Edges are looked for so far from where they are expected: first by the outlines, then by the pose of the first."""
+_REACHES_PX = (5.0, 3.0, 3.0)
+"""Edges are looked for so far from where they are expected: first by the outlines, then by the pose before."""
+
+
+_MISFIT = 2.0
+"""With residuals this many times as large as they should be, another size of the crosses is tried."""
 
 
 @dataclass(frozen=True)
@@ -63,14 +68,22 @@ class CrossLocaliser(ABC):
         count = len(reading.crosses)
         numbers = np.repeat([one.number for one in reading.crosses], 12).astype(np.int64)
         outlines = np.concatenate([one.corners_px for one in reading.crosses])
-        seen = corners_at(camera, layout, numbers, np.tile(np.arange(12), count), outlines, _OUTLINE_PX)
-        found = self._first_pose(seen, camera, layout)
+        rough = corners_at(camera, layout, numbers, np.tile(np.arange(12), count), outlines, _OUTLINE_PX)
+        measured = seen = rough
+        found = self._first_pose(rough, camera, layout)
         for reach_px in _REACHES_PX:
             if found is None:
                 break
-            seen = measure_corners(image, camera, layout, found.camera_from_room, reach_px)
+            measured = measure_corners(image, camera, layout, found.camera_from_room, reach_px)
+            seen = without_growth(measured, found.camera_from_room)
             found = self._pose(seen, camera, layout, found.camera_from_room)
-        return _unexplained(seen, layout) if found is None else self.judged(found, seen, camera, layout)
+        told = _unexplained(seen, layout) if found is None else self.judged(found, seen, camera, layout)
+        if found is None or found.scale > _MISFIT:
+            # What crosses of another size look like must not be taken for ink that has grown.
+            size = other_size(measured) or other_size(rough)
+            if size is not None:
+                return replace(told, status=Status.BAD_INPUT, message=_size_sentence(size))
+        return told
 
     @abstractmethod
     def _first_pose(self, seen: SeenCorners, camera: Camera, layout: CrossLayout) -> FoundPose | None:
@@ -85,8 +98,6 @@ class CrossLocaliser(ABC):
         used = seen.of(found.agree)
         names = tuple(layout.crosses[number].name for number in used.crosses)
         status, message = self._status(found)
-        if found.scale > 2.0 and (size := other_size(seen)) is not None:
-            status, message = Status.BAD_INPUT, _size_sentence(size)
         variance = np.linalg.inv(used.information).trace(axis1=1, axis2=2) / 2.0
         return Localisation(
             status,
@@ -149,9 +160,6 @@ def _count(foreign: int) -> str:
 
 def _unexplained(seen: SeenCorners, layout: CrossLayout) -> Localisation:
     names = tuple(layout.crosses[number].name for number in seen.crosses)
-    size = other_size(seen)
-    if size is not None:
-        return Localisation(Status.BAD_INPUT, _size_sentence(size), crosses=names, corners_px=seen.pixels)
     return Localisation(
         Status.UNOBSERVABLE,
         f"No pose explains the crosses that are seen, {_listed(names)}; check the layout, and whether one was moved.",

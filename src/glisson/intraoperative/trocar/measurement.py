@@ -23,7 +23,7 @@ _LEAST_SAMPLES, _LEAST_SPAN = 7, 0.45
 _NEXT_CORNER = 0.35
 """It leads to a corner where samples fit up to this share of its length before it."""
 
-_FLOOR_PX = 0.03
+_FLOOR_PX = 0.04
 """What paper, print and light leave of every edge, however many samples it has."""
 
 _ROBUST_FITS = 4
@@ -59,23 +59,39 @@ def measure_corners(
     numbers = [n for n, cross in enumerate(layout.crosses) if _is_in_view(cross, camera, camera_from_room, reach_px)]
     places = np.array([layout.crosses[n].corners_mm for n in numbers]).reshape(-1, 12, 3)
     lines = _fitted(image, camera, layout, numbers, places, camera_from_room, reach_px)
-    cross, corner, slopes, information = [], [], [], []
-    for one in range(len(numbers)):
+    pixel = 1.0 / float(camera.focal_px.mean())
+    cross, corner, slopes, information, growth = [], [], [], [], []
+    for one, number in enumerate(numbers):
         for k in range(12):
-            last, first = 12 * one + (k - 1) % 12, 12 * one + k
-            if lines.ends[last, 1] and lines.ends[first, 0]:
-                normals = lines.normals[[last, first]]
-                weights = 1.0 / np.array([lines.variances[last, 1], lines.variances[first, 0]])
-                cross.append(numbers[one])
-                corner.append(k)
-                slopes.append(np.linalg.solve(normals, lines.offsets[[last, first]]))
-                information.append((normals.T * weights) @ normals)
-    places = np.array([one.corners_mm for one in layout.crosses])
+            edges = [12 * one + (k - 1) % 12, 12 * one + k]
+            if not (lines.ends[edges[0], 1] and lines.ends[edges[1], 0]):
+                continue
+            normals = lines.normals[edges]
+            weights = 1.0 / np.array([lines.variances[edges[0], 1], lines.variances[edges[1], 0]])
+            grown = np.zeros((2, len(COLOURS)))
+            for row, edge in enumerate(edges):
+                grown[row, COLOURS.index(layout.crosses[number].colours[_EDGE_ARMS[edge % 12]])] = pixel
+            cross.append(number)
+            corner.append(k)
+            slopes.append(np.linalg.solve(normals, lines.offsets[edges]))
+            information.append((normals.T * weights) @ normals)
+            growth.append(np.linalg.solve(normals, grown))
+    return _seen(camera, layout, cross, corner, np.array(slopes), np.array(information), np.array(growth))
+
+
+def _seen(
+    camera: Camera, layout: CrossLayout, cross: list[int], corner: list[int], slopes: FloatArray,
+    information: FloatArray, growth: FloatArray,
+) -> SeenCorners:  # fmt: skip
     found, which = np.array(cross, dtype=np.int64), np.array(corner, dtype=np.int64)
-    flat = np.array(slopes).reshape(-1, 2)
-    rays = np.column_stack([flat, np.ones(len(flat))])
+    places = np.array([one.corners_mm for one in layout.crosses])
+    slopes = slopes.reshape(-1, 2)
+    rays = np.column_stack([slopes, np.ones(len(slopes))])
     pixels = project(camera, _NO_MOTION, rays) if len(rays) else np.zeros((0, 2))
-    return SeenCorners(found, which, places[found, which], pixels, flat, np.array(information).reshape(-1, 2, 2))
+    return SeenCorners(
+        found, which, places[found, which], pixels, slopes, information.reshape(-1, 2, 2),
+        growth.reshape(-1, 2, len(COLOURS)),
+    )  # fmt: skip
 
 
 _NO_MOTION = RigidTransform("camera", "camera", np.eye(3), np.zeros(3))

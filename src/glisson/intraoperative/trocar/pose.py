@@ -22,6 +22,12 @@ _BOUND = float(np.sqrt(chi2.ppf(CONFIDENCE, 3)))
 _OFF = float(chi2.ppf(0.9999999, 2))
 """A corner that errs by more (squared, in units of its covariance) is none: one of ten million would be."""
 
+_MEDIAN_SQUARE = 2.0 * np.log(2.0)
+"""Median of the squared error of a corner, in units of its covariance."""
+
+_WORSE = 5.0
+"""Corners may err by this factor more than is stated of them; the covariance counts that."""
+
 _CLEARLY_WORSE = 50.0
 """A second pose whose squared error is larger by this is e²⁵ times less likely."""
 
@@ -128,17 +134,24 @@ def _grown(weighted: SeenCorners, guess: RefinedPose) -> _Agreed | None:
         # Geman and McClure's weights.
         weights = 1.0 / (1.0 + _squares(weighted, pose) / _SOFT) ** 2
         pose = _refined(replace(weighted, information=weighted.information * weights[:, None, None]), pose)
-    agree = _squares(weighted, pose) < _OFF
+    agree = _agreeing(weighted, pose)
     for _ in range(_REWEIGHTED):
         crosses, counts = np.unique(weighted.cross[agree], return_counts=True)
         # Most of the corners must agree, and of most of the crosses some: half of them might tell another pose.
         if (counts >= 3).sum() < 2 or 2 * len(crosses) <= len(weighted.crosses) or 2 * agree.sum() <= len(agree):
             return None
         pose = _refined(weighted.of(agree), pose)
-        before, agree = agree, _squares(weighted, pose) < _OFF
+        before, agree = agree, _agreeing(weighted, pose)
         if (agree == before).all():
             return _Agreed(pose, weighted, agree)
     return None
+
+
+def _agreeing(seen: SeenCorners, pose: RefinedPose) -> NDArray[np.bool_]:
+    """Which corners (n,) agree with a pose; where most err by more than they should, the limit is wider by as much."""
+    squares = _squares(seen, pose)
+    typical = float(np.median(squares)) / _MEDIAN_SQUARE
+    return np.asarray(squares < _OFF * min(max(1.0, typical), _WORSE**2))
 
 
 def _refined(seen: SeenCorners, pose: RefinedPose) -> RefinedPose:

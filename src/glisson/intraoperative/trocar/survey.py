@@ -12,7 +12,7 @@ from glisson.core.errors import BadInput, StageFailed
 from glisson.core.status import Status
 from glisson.core.transform import RigidTransform
 from glisson.intraoperative.trocar.bundle import Bundle, adjusted
-from glisson.intraoperative.trocar.corners import SeenCorners, corners_at
+from glisson.intraoperative.trocar.corners import SeenCorners, corners_at, joined
 from glisson.intraoperative.trocar.measurement import measure_corners
 from glisson.intraoperative.trocar.outlines import cross_outlines
 from glisson.intraoperative.trocar.pose import global_pose
@@ -67,7 +67,8 @@ def survey_layout(
         raise BadInput(f"The measured distance must be between two of the crosses {', '.join(names)}.")
     if not (np.isfinite(distance.length_mm) and distance.length_mm > 0.0):
         raise BadInput(f"The measured distance must be positive, not {distance.length_mm} mm.")
-    views = [corners for image in images if len((corners := _corners(image, camera, layout)).crosses) >= 2]
+    measured = (_corners(image, camera, layout) for image in images)
+    views = [corners for corners in measured if corners is not None and len(corners.crosses) >= 2]
     for number, name in enumerate(names):
         if sum(number in view.crosses for view in views) < 2:
             raise StageFailed(
@@ -83,7 +84,7 @@ def survey_layout(
     return Survey(CrossLayout(crosses), result.size_factor, result.size_sigma, result.residual_px, len(views))
 
 
-def _corners(image: NDArray[np.uint8], camera: Camera, layout: CrossLayout) -> SeenCorners:
+def _corners(image: NDArray[np.uint8], camera: Camera, layout: CrossLayout) -> SeenCorners | None:
     """Corners of each cross that can be read, measured for itself: where it hangs is not known yet."""
     seen = []
     for read in read_crosses(image, cross_outlines(image), layout).crosses:
@@ -97,10 +98,7 @@ def _corners(image: NDArray[np.uint8], camera: Camera, layout: CrossLayout) -> S
             corners = measure_corners(image, camera, alone, about, reach_px)
         if len(corners) >= 8:
             seen.append(replace(corners, cross=np.full(len(corners), read.number)))
-    if not seen:
-        empty = np.zeros(0, dtype=np.int64)
-        return corners_at(camera, layout, empty, empty, np.zeros((0, 2)), 1.0)
-    return SeenCorners(*(np.concatenate([vars(one)[name] for one in seen]) for name in vars(seen[0])))
+    return joined(seen) if seen else None
 
 
 def _linked(views: Sequence[SeenCorners], camera: Camera, layout: CrossLayout) -> Bundle:

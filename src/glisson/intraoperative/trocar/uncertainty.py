@@ -42,7 +42,7 @@ def pose_covariance(
         camera: with covariance, if known.
         layout: with covariances of the places, if known.
     """
-    if _is_exact(used, camera, layout):
+    if _is_exact(used, camera, layout) and used.growth_covariance is None:
         return np.asarray(np.linalg.inv(pose.normal) * scale**2, dtype=np.float64)
     by_pose, by_camera = _derivatives(used, pose, camera)
     gain = np.linalg.solve(pose.normal, by_pose.transpose(0, 2, 1) @ weights)
@@ -51,6 +51,9 @@ def pose_covariance(
     if camera.covariance is not None:
         of_camera = (gain @ by_camera).sum(axis=0)
         total += of_camera @ camera.covariance @ of_camera.T
+    if used.growth is not None and used.growth_covariance is not None:
+        of_growth = (gain @ used.growth).sum(axis=0)
+        total += of_growth @ used.growth_covariance @ of_growth.T * scale**2
     by_place, covariances = _by_place(used, pose, by_pose, layout)
     of_places = np.zeros((len(layout), 6, 6))
     np.add.at(of_places, used.cross, gain @ by_place)
@@ -67,6 +70,11 @@ def _derivatives(seen: SeenCorners, pose: RefinedPose, camera: Camera) -> tuple[
     """Derivatives of the slopes by the pose (n, 2, 6), and by focal lengths, principal point, distortion (n, 2, 9)."""
     transform = RigidTransform("camera", "room", pose.rotation, pose.translation_mm)
     _, by_all = project_with_jacobian(camera, transform, seen.points_mm)
+    return slopes_by_pose(seen, pose), by_all[:, :, 6:] / camera.focal_px[:, None]
+
+
+def slopes_by_pose(seen: SeenCorners, pose: RefinedPose) -> FloatArray:
+    """Derivatives (n, 2, 6) of the slopes by d and e of `RigidTransform`."""
     in_camera = seen.points_mm @ pose.rotation.T + pose.translation_mm
     turned = in_camera - pose.translation_mm
     depth, slopes = in_camera[:, 2:], in_camera[:, :2] / in_camera[:, 2:]
@@ -75,7 +83,7 @@ def _derivatives(seen: SeenCorners, pose: RefinedPose, camera: Camera) -> tuple[
     by_shift[:, :, 2] = -slopes / depth
     # A turn d moves the point by d × turned.
     by_turn = np.cross(turned[:, None], by_shift)
-    return np.concatenate([by_turn, by_shift], axis=2), by_all[:, :, 6:] / camera.focal_px[:, None]
+    return np.concatenate([by_turn, by_shift], axis=2)
 
 
 def _by_place(

@@ -47,7 +47,7 @@ def localise_images(inputs: Mapping[str, Any], folder: Path) -> Outcome:
         view = draw_view(inputs["layout"], rng)
         scene = draw_scene(view.room, view.layout, view.room_from_trocar, rng)
         sensor = Sensor(rng.uniform(0.5, 1.1), rng.uniform(1.0, 4.0), rng.uniform(1.0, 4.0), rng.uniform(0.0, 0.3))
-        image = views.view(scene, view.room_from_trocar, sensor, rng)
+        image = views.view(scene, view.room_from_trocar, sensor, rng, gamma=rng.uniform(1.0, 2.4))
         visible = sum(views.visible(scene, cross, view.room_from_trocar) for cross in view.layout.crosses)
         if number == inputs["first"]:  # what is compiled or loaded at the first call is no part of the time
             ours.localise(image, view.given_camera, view.given_layout)
