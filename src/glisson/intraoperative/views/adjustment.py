@@ -14,7 +14,7 @@ from glisson.core.errors import StageFailed
 from glisson.core.status import Status
 from glisson.intraoperative.views.residuals import Linearised, Problem, State, linearised
 
-_STEPS = 60
+_STEPS = 200
 _SMALL = 1e-3
 """A step of less than so many standard deviations is no step."""
 
@@ -31,7 +31,7 @@ class Solution:
 
 
 def solve(problem: Problem, state: State, least_gain: float = 1e-2) -> Solution:
-    """The state of least cost by Levenberg's and Marquardt's method.
+    """The state of least cost by Levenberg's and Marquardt's method, damped as Nielsen (1999) does.
 
     Args:
         problem: what was measured.
@@ -41,20 +41,20 @@ def solve(problem: Problem, state: State, least_gain: float = 1e-2) -> Solution:
     Raises:
         StageFailed: it does not come to rest.
     """
-    at, damping = linearised(problem, state), 1e-4
+    at, damping, growth = linearised(problem, state), 1e-4, 2.0
     for _ in range(_STEPS):
         normal = _Normal(problem, at)
         moved, size = normal.step(state, damping)
         tried = linearised(problem, moved)
         if tried.cost <= at.cost + 1e-9:
             gain = at.cost - tried.cost
-            state, at, damping = moved, tried, max(damping / 10.0, 1e-9)
+            share = gain / max(size**2, 1e-12)
+            state, at = moved, tried
+            damping, growth = max(damping * max(1.0 / 3.0, 1.0 - (2.0 * share - 1.0) ** 3), 1e-9), 2.0
             if size < _SMALL or gain < least_gain:
                 return _solution(problem, state, at)
         else:
-            damping *= 10.0
-            if damping > 1e8:
-                break
+            damping, growth = damping * growth, 2.0 * growth
     raise StageFailed("The views could not be brought together; check poses, tip and landmarks.", Status.STAGNATED)
 
 
