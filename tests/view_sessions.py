@@ -4,12 +4,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import tomli_w
 
 from glisson.core.views import ViewSet
 from glisson.io.camera_files import write_camera
-from glisson.io.pictures import write_picture
 from glisson.phantom.half_sphere_box import CAMERA, HalfSphereBox, scope_place, touching_tool
 from glisson.phantom.laparoscope_view import picture_through
 from glisson.phantom.measured_views import ViewNoise
@@ -57,6 +57,6 @@ def add_pictures(folder: Path, table: dict[str, Any], angles_deg: Sequence[float
     for number, (entry, angle) in enumerate(zip(table["views"], angles_deg, strict=True)):
         rng = np.random.default_rng([1, number])
         picture = picture_through(CAMERA, scope_place(angle), HalfSphereBox(), touching_tool(), rng)
-        write_picture(folder / f"view{number + 1}.png", picture)
+        cv2.imwrite(str(folder / f"view{number + 1}.png"), picture[:, :, ::-1])
         entry["image"] = f"view{number + 1}.png"
         del entry["tip_px"]

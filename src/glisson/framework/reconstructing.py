@@ -16,7 +16,7 @@ from glisson.framework.view_figure import draw_views
 from glisson.intraoperative.views.features import match_features
 from glisson.intraoperative.views.tip import find_tip
 from glisson.io.observation_files import write_observations
-from glisson.io.pictures import read_picture, write_picture
+from glisson.io.photographs import read_photograph
 from glisson.io.view_session_files import SessionView, ViewSession, read_view_session
 
 JOINT = "bundle"
@@ -56,7 +56,7 @@ def reconstruct_session(
     images = tuple(_image(view) for view in given.views)
     views, found_tips = _view_set(given, images, progress)
     folder = Path(out)
-    write_picture(folder / PICTURE, draw_views(views, images))
+    draw_views(views, images, folder / PICTURE)
     progress(0.6, "reconstructing")
     found = maker.reconstruct(views, progress)
     write_observations(folder / OBSERVATIONS, found.observations)
@@ -66,7 +66,7 @@ def reconstruct_session(
 def _image(view: SessionView) -> NDArray[np.uint8] | None:
     if view.image is None:
         return None
-    image = read_picture(view.image)
+    image = read_photograph(view.image)
     if image.shape[:2] != (view.camera.height, view.camera.width):
         raise BadInput(
             f"{view.image} has {image.shape[1]} × {image.shape[0]} px, its camera "

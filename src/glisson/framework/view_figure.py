@@ -1,6 +1,7 @@
 """What was seen in laparoscope views, drawn on them."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -8,16 +9,22 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from glisson.core.views import ViewSet
+from glisson.io.atomic import atomic_path
 from glisson.navigation.figures.colours import BLUE, ORANGE, VERMILLION, YELLOW
-from glisson.navigation.figures.picture import new_figure
+from glisson.navigation.figures.picture import DOTS_PER_INCH, new_figure
 
 _WIDTH_PX = 720
 _MOST = 4
 _OUTLINE = (withStroke(linewidth=3, foreground="black"),)
 
 
-def draw_views(views: ViewSet, images: Sequence[NDArray[np.uint8] | None]) -> NDArray[np.uint8]:
-    """The first four views two by two, with tip, principal point, landmarks and features."""
+def draw_views(views: ViewSet, images: Sequence[NDArray[np.uint8] | None], path: Path) -> None:
+    """Draw the first four views two by two, with tip, principal point, landmarks and features, into a PNG.
+
+    Raises:
+        BadInput: the place cannot be written.
+        WriteFailed: the disk is full.
+    """
     shown = min(len(views.views), _MOST)
     across, down = min(shown, 2), (shown + 1) // 2
     camera = views.views[0].camera
@@ -26,8 +33,8 @@ def draw_views(views: ViewSet, images: Sequence[NDArray[np.uint8] | None]) -> ND
     for number in range(shown):
         axes = figure.add_axes(((number % 2) / across, 1.0 - (number // 2 + 1) / down, 1.0 / across, 1.0 / down))
         _draw(axes, views, number, images[number])
-    figure.canvas.draw()
-    return np.asarray(figure.canvas.buffer_rgba(), dtype=np.uint8)[:, :, :3].copy()  # type: ignore[attr-defined]
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, dpi=DOTS_PER_INCH, metadata={"Software": None})
 
 
 def _draw(axes: Axes, views: ViewSet, number: int, image: NDArray[np.uint8] | None) -> None:

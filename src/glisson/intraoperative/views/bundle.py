@@ -16,12 +16,13 @@ from glisson.core.status import Status
 from glisson.core.transform import RigidTransform
 from glisson.core.views import Sightings, ViewSet
 from glisson.intraoperative.cameras.projection import directions
-from glisson.intraoperative.views.adjustment import Problem, Solution, State, solve
+from glisson.intraoperative.views.adjustment import Solution, solve
 from glisson.intraoperative.views.contradictions import contradictions
 from glisson.intraoperative.views.epipolar import epipolar_statistics
 from glisson.intraoperative.views.outcome import landmark_observations, observation
 from glisson.intraoperative.views.parallax import judged, parallax_rad, require_parallax
 from glisson.intraoperative.views.parameters import ReconstructionParameters
+from glisson.intraoperative.views.residuals import Problem, State
 
 _GATE = float(chi2.isf(1e-4, 1))
 _MOST_REFUSED = 0.5

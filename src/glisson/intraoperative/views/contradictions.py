@@ -10,7 +10,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from glisson.core.arrays import FloatArray, IntArray
-from glisson.intraoperative.views.adjustment import Problem, Solution
+from glisson.intraoperative.views.adjustment import Solution
+from glisson.intraoperative.views.residuals import Problem
 
 _FALSE_ALARMS = 1e-3
 """So many adjustments of good measurements are flagged."""
