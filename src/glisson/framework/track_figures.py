@@ -91,7 +91,7 @@ def draw_breathing(tracks: Tracks, cycles: Cycles, model: BreathingModel, marker
 
 
 def draw_moves(tracks: Tracks, marker: int, exhalations_s: FloatArray) -> Picture:
-    """How a marker moves in x and y from where it was at the first full exhalation (the dissertation's Figure II.34)."""
+    """How a marker moves in x and y from its place at the first full exhalation (the dissertation's Figure II.34)."""
     figure = new_figure(1000, 520)
     home = tracks.places[np.nanargmin(np.abs(tracks.times_s - exhalations_s[0])), marker]
     apart = tracks.places[:, marker] - home
