@@ -1,0 +1,94 @@
+"""Least squares over cameras and poses, which are moved by small steps rather than added to."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.spatial.transform import Rotation
+
+from glisson.core.arrays import FloatArray
+from glisson.core.transform import RigidTransform
+
+State = TypeVar("State")
+
+_ITERATIONS = 100
+_LEAST_GAIN = 1e-12
+_SINGULAR = 1e-13
+
+
+@dataclass(frozen=True, eq=False)
+class NormalEquations:
+    """What is minimised at a state: half of the sum of squares, its gradient (n,) and JᵀJ (n, n)."""
+
+    cost: float
+    gradient: FloatArray
+    matrix: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Minimum(Generic[State]):
+    """The state with the least sum of squares, and the normal equations there."""
+
+    state: State
+    equations: NormalEquations
+
+
+def minimum(
+    start: State, equations_at: Callable[[State], NormalEquations], moved: Callable[[State, FloatArray], State]
+) -> Minimum[State]:
+    """The minimum nearest to `start`, by Levenberg's and Marquardt's method (Marquardt 1963).
+
+    Args:
+        start: where to begin.
+        equations_at: the normal equations at a state; an infinite cost where a state is impossible.
+        moved: a state moved by a step (n,).
+    """
+    state, here, damping = start, equations_at(start), 1e-4
+    for _ in range(_ITERATIONS):
+        scale = np.diag(here.matrix) + 1e-12 * np.trace(here.matrix)
+        try:
+            step = cho_solve(cho_factor(here.matrix + damping * np.diag(scale)), -here.gradient)
+        except LinAlgError:
+            damping *= 10.0
+            continue
+        tried = moved(state, step)
+        there = equations_at(tried)
+        if there.cost < here.cost:
+            gain = here.cost - there.cost
+            state, here, damping = tried, there, max(damping * 0.1, 1e-12)
+            if gain < _LEAST_GAIN * here.cost:
+                break
+        elif damping > 1e8:
+            break
+        else:
+            damping *= 10.0
+    return Minimum(state, here)
+
+
+def moved_pose(pose: RigidTransform, step: FloatArray) -> RigidTransform:
+    """A pose moved by d and e (6,), see `RigidTransform`; without covariance."""
+    turn = Rotation.from_rotvec(step[:3]).as_matrix()
+    return RigidTransform(pose.target, pose.source, turn @ pose.rotation, pose.translation_mm + step[3:])
+
+
+def with_covariance(pose: RigidTransform, covariance: FloatArray) -> RigidTransform:
+    """The same pose with a covariance (6, 6)."""
+    return RigidTransform(pose.target, pose.source, pose.rotation, pose.translation_mm, covariance)
+
+
+def inverse(matrix: FloatArray) -> FloatArray | None:
+    """The inverse of normal equations (n, n), or None where some direction is not determined.
+
+    Unknowns of all units are brought to one scale first.
+    """
+    diagonal = np.diag(matrix)
+    if not (np.isfinite(matrix).all() and (diagonal > 0.0).all()):
+        return None
+    scale = 1.0 / np.sqrt(diagonal)
+    values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
+    if values[0] < _SINGULAR * values[-1]:
+        return None
+    result: FloatArray = (vectors / values) @ vectors.T * np.outer(scale, scale)
+    return result
