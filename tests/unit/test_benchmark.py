@@ -357,3 +357,32 @@ def test_the_judge_of_masks_against_a_disc(scripts):
     assert scores["dice"] == pytest.approx(2.0 * inner / (inner + outer))
     assert scores["difference"] == pytest.approx(6.0, abs=0.75)
     assert judge(problem, [problem.truth])[0] == {"dice": 1.0, "difference": 0.0}
+
+
+def test_trackers_follow_the_video_of_the_benchmark(scripts, tmp_path):
+    """Ours stays with every mark that is not covered; OpenCV's flow alone loses those that once were."""
+    scripts("tracking")
+    from glisson_engine import follow
+    from judge import judge
+    from meshes import main
+    from opencv_engine import decode, flow
+
+    main(60, tmp_path / "video.npz")
+    truth = np.load(tmp_path / "video.npz")
+    marks, visible = truth["marks"], truth["visible"]
+    video = tmp_path / "video.avi"
+    ours, theirs = follow(video, marks[0], None), flow(video, marks[0], None)
+    assert ours.shape == theirs.shape == (60, 20, 2)
+    assert judge(marks, visible, ours) < 0.05
+    assert decode(video, marks[0], 5) is None
+    shifted = marks + [3.0, 4.0]
+    assert judge(marks, visible, shifted) == pytest.approx(5.0)
+    assert judge(marks, visible, np.full_like(marks, np.nan)) is None
+    assert judge(marks, visible, np.zeros((0, 0, 2))) is None
+
+
+def test_a_video_is_told_in_frames_per_second():
+    rows = [benchmark.Row("Glisson, lucas-kanade", "frames", 150, seconds=1.5, memory_mb=200.0, difference=0.0254)]
+    heading, line = list(tables(rows))[1:]
+    assert "frames/s" in heading
+    assert line.split()[-3:] == ["100", "200", "0.025"]

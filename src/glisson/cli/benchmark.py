@@ -13,6 +13,8 @@ from glisson.framework.benchmark import RESULTS, Benchmark, Row
 from glisson.framework.benchmark_plot import PLOT, draw_cost
 
 _OURS = "Glisson"
+_FRAMES = "frames"
+_VIDEO_HEADING = "  engine                       seconds  ratio frames/s     MB  px off"
 _MASK_HEADING = "  engine                       seconds  ratio  its     MB    Dice  difference"
 _HEADING = "  engine                  seconds  ratio  its     MB  residual difference  moved (mm)"
 
@@ -20,9 +22,10 @@ _HEADING = "  engine                  seconds  ratio  its     MB  residual diffe
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "benchmark",
-        choices=("solver", "lift", "segmentation"),
+        choices=("solver", "lift", "segmentation", "tracking"),
         help="solver: the same hyperelastic problem on the same meshes by Glisson and by other engines; "
-        "lift: the two-stage lever lift with friction; segmentation: the liver of a phantom by contours",
+        "lift: the two-stage lever lift with friction; segmentation: the liver of a phantom by contours; "
+        "tracking: 20 markers through a video of 960 × 540",
     )
     parser.add_argument("--quick", action="store_true", help="one small problem instead of all; some minutes")
     parser.add_argument("--out", metavar="DIR", help="where results go (default: studies/benchmark-NAME)")
@@ -43,8 +46,14 @@ def _tables(rows: Sequence[Row]) -> Iterator[str]:
         measured = sorted(group, key=lambda row: (row.seconds is None, row.seconds or 0.0))
         peers = [row.seconds for row in measured if row.seconds is not None and not row.engine.startswith(_OURS)]
         yield f"{elements:,} {element}"
-        yield _HEADING if all(row.dice is None for row in measured) else _MASK_HEADING
+        yield _heading(measured)
         yield from (f"  {_line(row, peers[0] if peers else None)}" for row in measured)
+
+
+def _heading(rows: Sequence[Row]) -> str:
+    if rows[0].element == _FRAMES:
+        return _VIDEO_HEADING
+    return _HEADING if all(row.dice is None for row in rows) else _MASK_HEADING
 
 
 def _line(row: Row, fastest: float | None) -> str:
@@ -52,6 +61,11 @@ def _line(row: Row, fastest: float | None) -> str:
         return f"{row.engine:22s} {'–':>8s}  {row.reason}"
     ratio = "–" if fastest is None else f"{row.seconds / fastest:.2f}"
     memory, residual, difference = row.memory_mb or 0.0, row.residual or 0.0, row.difference or 0.0
+    if row.element == _FRAMES:
+        off = "–" if row.difference is None else f"{row.difference:.3f}"
+        return (
+            f"{row.engine:27s} {row.seconds:8.2f} {ratio:>6s} {row.elements / row.seconds:8.0f} {memory:6.0f} {off:>7s}"
+        )
     if row.dice is not None:
         return (
             f"{row.engine:27s} {row.seconds:8.2f} {ratio:>6s} {row.iterations or '–':>4} {memory:6.0f} "

@@ -90,22 +90,24 @@ def draw_breathing(tracks: Tracks, cycles: Cycles, model: BreathingModel, marker
     )
 
 
-def draw_distance(tracks: Tracks, pair: tuple[int, int], exhalations_s: FloatArray) -> Picture:
-    """Distance between two markers in x and y over time (the dissertation's Figure II.34)."""
+def draw_moves(tracks: Tracks, marker: int, exhalations_s: FloatArray) -> Picture:
+    """How a marker moves in x and y from its place at the first full exhalation (the dissertation's Figure II.34)."""
     figure = new_figure(1000, 520)
-    apart = tracks.places[:, pair[1]] - tracks.places[:, pair[0]]
+    home = tracks.places[np.nanargmin(np.abs(tracks.times_s - exhalations_s[0])), marker]
+    apart = tracks.places[:, marker] - home
     for row, name in enumerate(("x", "y")):
-        axes = figure.add_axes((0.09, 0.58 - 0.47 * row, 0.88, 0.36))
-        axes.plot(tracks.times_s, np.abs(apart[:, row]), color=BLUE, lw=1.4)
+        axes = figure.add_axes((0.09, 0.58 - 0.48 * row, 0.88, 0.36))
+        axes.plot(tracks.times_s, apart[:, row], color=BLUE, lw=1.4)
         for n, moment in enumerate(exhalations_s):
-            axes.axvline(moment, color=GREEN, lw=1.2, ls="--", label="full exhalation" if n == 0 else None)
-        axes.set(xlabel="time (s)", ylabel=f"distance in {name} ({tracks.unit})")
+            axes.axvline(moment, color=GREEN, lw=1.2, ls="--", label="full exhalation" if n == 0 and row == 0 else None)
+        axes.set(xlabel="time (s)", ylabel=f"moved in {name} ({tracks.unit})")
         axes.set_xlim(tracks.times_s[0], tracks.times_s[-1])
-        axes.legend(fontsize=10, loc="lower right", bbox_to_anchor=(1.0, 0.98), frameon=False)
+    figure.legend(fontsize=10, loc="upper right", frameon=False)
     return picture(
         figure,
-        f"Distance between markers {pair[0] + 1} and {pair[1] + 1} in x and y over time.",
-        f"Distance between markers {pair[0] + 1} and {pair[1] + 1} in x and in y (as Figure II.34).",
+        f"How marker {marker + 1} moves in x and y from where it was at the first full exhalation.",
+        f"How marker {marker + 1} moves in x (right) and y (down) from where it was at the first full exhalation (as "
+        "Figure II.34, which shows the distance from another marker).",
     )
 
 

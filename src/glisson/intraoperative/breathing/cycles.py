@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import find_peaks
@@ -21,6 +22,9 @@ _REPEATS = 0.25
 _SMOOTH = 0.04
 _APART, _PROMINENT = 0.45, 0.35
 """Two inhalations are at least this share of a period apart, and stand out by this share of the signal's range."""
+
+_NEARLY = 0.15
+"""An exhalation at an end of the recording is full within this share of a breath's depth."""
 
 _ENOUGH = 80
 """Values per breath with which its shape is fitted."""
@@ -106,17 +110,16 @@ def _upright(signal: Signal, times: FloatArray, exhaled_at_s: float | None) -> t
     """The signal with exhalation low."""
     values = signal.values
     low, high = np.percentile(values, [5.0, 95.0])
-    lean = (0.5 * (low + high) - float(np.median(values))) / max(high - low, 1e-12)
-    if exhaled_at_s is not None:
-        lean = 0.5 * (low + high) - float(np.interp(exhaled_at_s, times, values))
-        return (values if lean > 0.0 else -values), ()
-    if abs(lean) < _DWELL:
+    usual = np.median(values) if exhaled_at_s is None else np.interp(exhaled_at_s, times, values)
+    lean = float(0.5 * (low + high) - usual)
+    upright = values if lean > 0.0 else -values
+    if exhaled_at_s is None and abs(lean) < _DWELL * (high - low):
         note = (
             "The tissue stays as long at one end of its way as at the other, so exhalation and inhalation may be "
             "exchanged; give a moment of exhalation."
         )
-        return (values if lean > 0.0 else -values), (note,)
-    return (values if lean > 0.0 else -values), ()
+        return upright, (note,)
+    return upright, ()
 
 
 def _means(values: FloatArray, block: int) -> FloatArray:
@@ -128,12 +131,11 @@ def _means(values: FloatArray, block: int) -> FloatArray:
 def _period(values: FloatArray, times: FloatArray) -> float:
     """The time (s) after which the signal is most like itself."""
     step = float(np.median(np.diff(times)))
-    straight = np.polynomial.Polynomial.fit(times, values, 1)(times)
-    centred = values - straight
+    centred = values - np.polynomial.Polynomial.fit(times, values, 1)(times)
     n = len(centred)
-    power = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
-    likeness = np.fft.irfft(power)[:n] / max(power.sum() / n, 1e-300)
-    likeness = likeness / max(likeness[0], 1e-300) * n / np.maximum(n - np.arange(n), 0.25 * n)
+    products = np.fft.irfft(np.abs(np.fft.rfft(centred, 2 * n)) ** 2)[:n]
+    # Of long lags there are few products.
+    likeness = products / max(products[0], 1e-300) * n / np.maximum(n - np.arange(n), 0.25 * n)
     negative = np.flatnonzero(likeness < 0.0)
     if len(negative):
         tops, _ = find_peaks(likeness[: int(0.75 * n)], height=_REPEATS)
@@ -147,7 +149,7 @@ def _period(values: FloatArray, times: FloatArray) -> float:
     )
 
 
-def _turns(smooth: FloatArray, period_frames: float) -> tuple[np.ndarray, np.ndarray]:
+def _turns(smooth: FloatArray, period_frames: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Frames of full inhalation, and those of full exhalation before, between and after them."""
     extent = float(np.subtract(*np.percentile(smooth, [95.0, 5.0])))
     tops, _ = find_peaks(smooth, distance=max(_APART * period_frames, 1.0), prominence=_PROMINENT * extent)
@@ -156,12 +158,13 @@ def _turns(smooth: FloatArray, period_frames: float) -> tuple[np.ndarray, np.nda
     lows = [int(a + np.argmin(smooth[a:b])) for a, b in pairwise(tops)]
     # A breath at an end counts where its full exhalation is in the recording.
     before, after = smooth[: tops[0]], smooth[tops[-1] :]
-    level, height = np.median(smooth[lows]), np.median(smooth[tops])
-    if before.min() < level + 0.15 * (height - level) and np.argmin(before) > 0:
+    low, height = np.median(smooth[lows]), np.median(smooth[tops])
+    full = low + _NEARLY * (height - low)
+    if before.min() < full and np.argmin(before) > 0:
         lows.insert(0, int(np.argmin(before)))
     else:
         tops = tops[1:]
-    if after.min() < level + 0.15 * (height - level) and np.argmin(after) < len(after) - 1:
+    if after.min() < full and np.argmin(after) < len(after) - 1:
         lows.append(int(tops[-1] + np.argmin(after)))
     else:
         tops = tops[:-1]

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
 from glisson.core.arrays import FloatArray
@@ -65,7 +66,7 @@ class BreathingModel:
         apart = np.linalg.norm(way[:, None] - way[None, :], axis=3)
         return np.asarray(apart.max(axis=(0, 1)))
 
-    def gate(self, times_s: FloatArray, within: float) -> np.ndarray:
+    def gate(self, times_s: FloatArray, within: float) -> NDArray[np.bool_]:
         """Which frames (n,) to use: breathing has moved no marker further than `within` from full exhalation."""
         moved = np.linalg.norm(self.breathing(times_s), axis=2)
         known = np.isfinite(self.covariance[:, 0, 0])

@@ -11,7 +11,7 @@ from glisson.core.status import Status
 from glisson.intraoperative.breathing.displacement import Displacement
 
 _ORDER = 3
-_STEP_HZ = 0.02
+_STEP_HZ = 0.005
 _REPEATS = 0.02
 """Standard deviation, as a share, with which a displacement comes out again when a recording is repeated."""
 

@@ -12,8 +12,13 @@ from glisson.core.arrays import FloatArray
 PIECES = 20
 """Cubic pieces of a breath's shape."""
 
-_ROUNDS = 3
+_ROUNDS, _EVALUATIONS = 3, 8
+_LEAST_PART, _FORBIDDEN = 0.02, 1e3
+"""Knots keep this share of a period apart: nearer ones are given a misfit of so many depths."""
+
 _FINE = np.linspace(0.0, 1.0, 1001)
+_LOOKED_BACK = 700
+"""So many thousandths of a breath before full inhalation it has begun."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,18 +94,15 @@ def _shape(knots: Knots, times: FloatArray, values: FloatArray) -> FloatArray:
     phase = np.interp(times, *knots.line)
     basis = periodic_basis(phase) - periodic_basis(np.zeros(1))
     design = _depth(knots, phase)[:, None] * basis
-    wanted = values - _level(knots, times)
-    return np.linalg.lstsq(np.vstack([design, 1e-6 * np.eye(PIECES)]), np.append(wanted, np.zeros(PIECES)), rcond=None)[
-        0
-    ]
+    # A constant more in all pieces changes nothing: the least of all solutions has none.
+    return np.asarray(np.linalg.lstsq(design, values - _level(knots, times), rcond=1e-9)[0])
 
 
 def _moved(knots: Knots, shape: FloatArray, times: FloatArray, values: FloatArray) -> Knots:
     """The knots moved, and depths and levels changed, so that the shape fits best."""
     k = len(knots.inhalations_s)
-    period = float(np.mean(np.diff(knots.exhalations_s)))
-    scale = float(np.mean(knots.depths))
-    basis_0 = periodic_basis(np.zeros(1))
+    period, scale = float(np.mean(np.diff(knots.exhalations_s))), float(np.mean(knots.depths))
+    start = periodic_basis(np.zeros(1))
 
     def made(parameters: FloatArray) -> Knots:
         moves = period * parameters[: 2 * k + 1]
@@ -114,16 +116,14 @@ def _moved(knots: Knots, shape: FloatArray, times: FloatArray, values: FloatArra
 
     def off(parameters: FloatArray) -> FloatArray:
         changed = made(parameters)
-        order = np.zeros(2 * k + 1)
-        order[0::2], order[1::2] = changed.exhalations_s, changed.inhalations_s
-        if (np.diff(order) < 0.02 * period).any():
-            return np.full(len(times), 1e3 * scale)
+        if (np.diff(changed.line[0]) < _LEAST_PART * period).any():
+            return np.full(len(times), _FORBIDDEN * scale)
         # A frame beside the first or last breath stays with it while the knots move.
         phase = np.interp(times, *changed.line)
-        fit = (periodic_basis(phase) - basis_0) @ shape
+        fit = (periodic_basis(phase) - start) @ shape
         return np.asarray(_level(changed, times) + _depth(changed, phase) * fit - values)
 
-    found = least_squares(off, np.zeros(4 * k + 2), jac_sparsity=_sparsity(knots, times), x_scale=1.0, max_nfev=8)
+    found = least_squares(off, np.zeros(4 * k + 2), jac_sparsity=_sparsity(knots, times), max_nfev=_EVALUATIONS)
     return made(found.x)
 
 
@@ -146,11 +146,11 @@ def _anchored(knots: Knots, shape: FloatArray) -> Knots:
     """
     values = (periodic_basis(_FINE) - periodic_basis(np.zeros(1))) @ shape
     top = int(np.argmax(values))
-    before = np.arange(top - 700, top + 1)
-    rise = values[before % 1000]
+    before = np.arange(top - _LOOKED_BACK, top + 1)
+    rise = values[before % (len(_FINE) - 1)]
     floor = rise.min()
     shares = (rise - floor) / (values[top] - floor)
-    through = [float(_last_below(shares, level)) for level in (0.025, 0.1)]
+    through = [_last_below(shares, level) for level in (0.025, 0.1)]
     low = 1e-3 * (before[0] + 2.0 * through[0] - through[1])
     high = 1e-3 * top
     k = np.arange(len(knots.exhalations_s), dtype=np.float64)

@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from glisson.core.status import Status
-from glisson.core.tracks import Tracks
-from glisson.framework.track_figures import draw_distance, draw_rates, draw_trajectories
+from glisson.core.tracks import PointState, Tracks
+from glisson.framework.track_figures import draw_moves, draw_rates, draw_trajectories
 from glisson.intraoperative.breathing.displacement import Displacement
 from glisson.intraoperative.breathing.plateau import find_plateau
 from glisson.navigation.figures.picture import Picture
@@ -19,7 +19,7 @@ def draw_all(points: Sequence[Point], done: Mapping[str, Outcome]) -> dict[str, 
     shown: dict[str, Picture] = {}
     breaths = _first(points, done, BREATHS.function, "places")
     if breaths is not None:
-        shown["figure-II.34"] = _distance(breaths)
+        shown["figure-II.34"] = _moves(breaths)
     conventional, sweep = (
         _first(points, done, CONVENTIONAL.function, "values"),
         _first(points, done, SWEEP.function, None),
@@ -37,22 +37,13 @@ def _first(points: Sequence[Point], done: Mapping[str, Outcome], function: str, 
     return done[here[0].key] if here and (array is None or array in done[here[0].key].arrays) else None
 
 
-def _distance(breaths: Outcome) -> Picture:
-    """Of the two markers whose distance changes most, among those that are seen nearly always."""
+def _moves(breaths: Outcome) -> Picture:
+    """Of the marker that is seen most."""
     places = breaths.arrays["places"]
     seen = np.isfinite(places[:, :, 0])
-    often = np.flatnonzero(seen.mean(axis=0) > 0.9)
-    apart = places[:, often, None] - places[:, None, often]
-    change = np.nanmax(apart, axis=0) - np.nanmin(apart, axis=0)
-    first, second = np.unravel_index(np.argmax(np.linalg.norm(change, axis=2)), change.shape[:2])
-    tracks = Tracks(
-        breaths.arrays["times"],
-        np.where(seen[:, :, None], places, 0.0),
-        np.zeros((*seen.shape, 2, 2)),
-        np.where(seen, 0, 2).astype(np.int8),
-        "mm",
-    )
-    return draw_distance(tracks, (int(often[first]), int(often[second])), breaths.arrays["exhalations"])
+    states = np.where(seen, PointState.FOLLOWED, PointState.LOST).astype(np.int8)
+    tracks = Tracks(breaths.arrays["times"], places, np.zeros((*seen.shape, 2, 2)), states, "mm")
+    return draw_moves(tracks, int(np.argmax(seen.sum(axis=0))), breaths.arrays["exhalations"])
 
 
 def _trajectories(conventional: Outcome, sweep: Outcome) -> Picture:

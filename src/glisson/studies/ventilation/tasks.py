@@ -35,7 +35,8 @@ from glisson.studies.ventilation.recordings import (
 
 _SOURCE = (
     "glisson.core", "glisson.intraoperative", "glisson.phantom.breathing", "glisson.phantom.optics",
-    "glisson.framework.tracking", "glisson.io.video", "glisson.studies.ventilation.recordings", __name__,
+    "glisson.phantom.photograph", "glisson.framework.tracking", "glisson.io.video",
+    "glisson.studies.ventilation.recordings", __name__,
 )  # fmt: skip
 
 MARKS, FEW_MARKS = 20, 8
