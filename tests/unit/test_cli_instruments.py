@@ -11,7 +11,7 @@ import pytest
 from glisson.core.transform import RigidTransform
 from glisson.io.instrument_files import EXAMPLE_LIBRARY, EXAMPLE_TROCAR, read_instruments, read_trocar
 from glisson.io.observation_files import read_observations
-from glisson.io.pictures import read_picture, write_picture
+from glisson.io.photographs import read_photograph, write_photograph
 from glisson.io.surfaces import read_surface
 from glisson.io.tip_files import read_tips
 from glisson.io.video import write_video
@@ -52,14 +52,14 @@ def test_a_library_is_made_listed_and_checked(tmp_path: Path, glisson: Glisson) 
 
 def test_the_instrument_of_a_picture(tmp_path: Path, glisson: Glisson, views: WheelViews) -> None:
     scene = scene_of("scissors")
-    write_picture(tmp_path / "view.png", views.view(scene))
+    write_photograph(tmp_path / "view.png", views.view(scene))
     code, said = glisson("instruments", "recognise", tmp_path / "view.png", "--trocar", EXAMPLE_TROCAR)
     assert code == 0, said
     assert said["instrument"] == "scissors"
     true = scene.trocar_from_instrument.apply(scene.instrument.tip_mm)
     assert np.linalg.norm(np.array(said["tip_mm"]) - true) < 4.0 * np.sqrt(np.trace(said["tip_covariance_mm2"]))
     assert said["room"] is None
-    assert read_picture(said["picture"]).shape == (960 + 64, 1280, 3)
+    assert read_photograph(said["picture"]).shape == (960 + 64, 1280, 3)
 
 
 @pytest.mark.parametrize(
@@ -79,8 +79,8 @@ def test_what_cannot_be_is_one_sentence(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, glisson: Glisson, words: list[str], code: int, sentence: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    write_picture("grey.png", np.full((960, 1280, 3), 120, dtype=np.uint8))
-    write_picture("small.png", np.full((96, 128, 3), 120, dtype=np.uint8))
+    write_photograph("grey.png", np.full((960, 1280, 3), 120, dtype=np.uint8))
+    write_photograph("small.png", np.full((96, 128, 3), 120, dtype=np.uint8))
     Path("text.avi").write_text("no video", encoding="utf-8")
     ended, said = glisson("instruments", *words)
     assert ended == code, said
@@ -109,7 +109,7 @@ def test_a_video_becomes_a_timeline_and_tips_a_plane(tmp_path: Path, glisson: Gl
     assert [use["frames"] for use in said["uses"]] == [4, 12]
     assert said["uses"][1]["from_s"] == pytest.approx(3.0, abs=0.01)
     assert said["not_recognised"] == {"unobservable": 8}
-    assert read_picture(said["picture"]).shape[1] == 960
+    assert read_photograph(said["picture"]).shape[1] == 960
     track = {one.instrument: one for one in read_tips(out / "tips.json")}["pointer"]
     assert np.linalg.norm(track.points_mm - tips, axis=1).max() < 2.0
 

@@ -17,7 +17,7 @@ from glisson.intraoperative.trocar.layout_design import DesignParameters, design
 from glisson.intraoperative.trocar.survey import Distance, survey_layout
 from glisson.io.camera_files import write_camera
 from glisson.io.layout_files import read_layout, write_layout
-from glisson.io.pictures import read_picture, write_picture
+from glisson.io.photographs import read_photograph, write_photograph
 from trocar_views import CAMERA, ROOM
 
 SMALL = DesignParameters(count=5, views=40, spacing_mm=500.0)
@@ -98,7 +98,7 @@ def test_commands(hung, tmp_path, capfd):
     names = []
     for number, image in enumerate(images):
         names.append(str(tmp_path / f"view{number}.png"))
-        write_picture(names[-1], image)
+        write_photograph(names[-1], image)
     length = np.linalg.norm(middles(true)[3] - middles(true)[1])
     given = ["--camera", str(tmp_path / "camera.toml")]
     assert main([
@@ -113,12 +113,12 @@ def test_commands(hung, tmp_path, capfd):
     told = json.loads(capfd.readouterr().out)
     assert told["status"] == "converged"
     assert np.array(told["covariance"]).shape == (6, 6)
-    assert read_picture(tmp_path / "seen.png").shape == (540, 640, 3)
-    write_picture(tmp_path / "mirrored.png", images[0][:, ::-1])
+    assert read_photograph(tmp_path / "seen.png").shape == (540, 640, 3)
+    write_photograph(tmp_path / "mirrored.png", images[0][:, ::-1])
     assert main(["localize", str(tmp_path / "mirrored.png"), *given]) == 2
     told = json.loads(capfd.readouterr().out)
     assert (told["status"], told["position_mm"]) == ("bad_input", None)
-    write_picture(tmp_path / "black.png", np.zeros_like(images[0]))
+    write_photograph(tmp_path / "black.png", np.zeros_like(images[0]))
     assert main(["localize", str(tmp_path / "black.png"), *given]) == 1
     assert json.loads(capfd.readouterr().out)["status"] == "unobservable"
     (tmp_path / "text.png").write_text("no picture", encoding="utf-8")

@@ -16,7 +16,7 @@ from glisson.framework.instruments import BY_CROSSES, BY_WHEEL, checked_library
 from glisson.intraoperative.instruments.timeline import Use, uses
 from glisson.io.instrument_files import read_trocar
 from glisson.io.layout_files import read_layout
-from glisson.io.pictures import write_picture
+from glisson.io.photographs import write_photograph
 from glisson.io.records import write_json
 from glisson.io.tip_files import write_tips
 from glisson.io.video import open_video
@@ -101,7 +101,7 @@ def _write(folder: Path, told: Timeline, end_s: float, sightings: list[_Sighting
     rows = [{"instrument": use.instrument, "from_s": use.from_s, "to_s": use.to_s, "frames": use.frames}
             for use in told.uses]  # fmt: skip
     write_json(folder / TIMELINE, {"schema": 1, "uses": rows, "frames": told.frames, "recognised": told.recognised})
-    write_picture(folder / PICTURE, draw_timeline(told.uses, end_s))
+    write_photograph(folder / PICTURE, draw_timeline(told.uses, end_s))
     names = dict.fromkeys(use.instrument for use in told.uses)
     write_tips(folder / TIPS, [_track(name, sightings, in_room) for name in names])
 

@@ -12,7 +12,7 @@ from glisson.framework.instrument_figure import draw_instrument
 from glisson.intraoperative.instruments.codes import alike_codes, free_code
 from glisson.io.instrument_files import EXAMPLE_LIBRARY, read_instruments, read_trocar, write_instruments
 from glisson.io.layout_files import read_layout
-from glisson.io.pictures import read_picture, write_picture
+from glisson.io.photographs import read_photograph, write_photograph
 
 BY_WHEEL = "colour-wheel"
 BY_CROSSES = "global"
@@ -97,7 +97,7 @@ def recognise_picture(
         StageFailed: see `glisson.core.protocols.InstrumentRecogniser`.
         WriteFailed: the disk is full.
     """
-    taken, through, known = read_picture(image), read_trocar(trocar), checked_library(library)
+    taken, through, known = read_photograph(image), read_trocar(trocar), checked_library(library)
     recogniser: InstrumentRecogniser = make_technique("instrument-recogniser", BY_WHEEL, {}, "--technique")
     seen = recogniser.recognise(taken, through, known)
     place = None
@@ -105,5 +105,5 @@ def recognise_picture(
         localiser: Localiser = make_technique("localiser", BY_CROSSES, {}, "--technique")
         place = localiser.localise(taken, through.camera, read_layout(layout))
     picture = Path(out) if out is not None else Path(image).with_name(f"{Path(image).stem}-instrument.png")
-    write_picture(picture, draw_instrument(taken, through, seen))
+    write_photograph(picture, draw_instrument(taken, through, seen))
     return Recognised(seen, place, picture)

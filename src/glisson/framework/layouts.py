@@ -9,7 +9,7 @@ from glisson.intraoperative.trocar.layout_design import Design, DesignParameters
 from glisson.intraoperative.trocar.survey import Distance, Survey, survey_layout
 from glisson.io.camera_files import read_camera
 from glisson.io.layout_files import read_layout, write_layout
-from glisson.io.pictures import read_picture
+from glisson.io.photographs import read_photograph
 from glisson.io.recommended import or_recommended_camera, or_recommended_room
 
 
@@ -45,7 +45,7 @@ def survey_room(
     taken_by = read_camera(camera)
     taken = []
     for path in images:
-        picture = read_picture(path)
+        picture = read_photograph(path)
         if picture.shape[:2] != (taken_by.height, taken_by.width):
             raise BadInput(f"{path} is not of the camera's {taken_by.width} × {taken_by.height} px.")
         taken.append(picture)

@@ -11,7 +11,7 @@ from glisson.core.registry import make_technique
 from glisson.framework.cross_figure import draw_localisation
 from glisson.io.camera_files import read_camera
 from glisson.io.layout_files import read_layout
-from glisson.io.pictures import read_picture, write_picture
+from glisson.io.photographs import read_photograph, write_photograph
 
 GLOBAL = "global"
 
@@ -47,8 +47,8 @@ def localise_trocar(
         WriteFailed: the disk is full.
     """
     maker: Localiser = make_technique("localiser", technique, parameters or {}, "--technique")
-    taken, seen_by, crosses = read_picture(image), read_camera(camera), read_layout(layout)
+    taken, seen_by, crosses = read_photograph(image), read_camera(camera), read_layout(layout)
     found = maker.localise(taken, seen_by, crosses)
     place = Path(out) if out is not None else Path(image).with_name(f"{Path(image).stem}-crosses.png")
-    write_picture(place, draw_localisation(taken, seen_by, crosses, found))
+    write_photograph(place, draw_localisation(taken, seen_by, crosses, found))
     return Localised(found, place)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glisson.core import BadInput
+from glisson.io.atomic import atomic_path
 from glisson.io.decoding import check_file_size, decoding
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
@@ -29,3 +30,15 @@ def read_photograph(path: str | Path) -> NDArray[np.uint8]:
         if image is None:
             raise BadInput("it is no image of a kind that is read (PNG, JPEG, BMP, TIFF), or it is damaged.")
         return np.asarray(image, dtype=np.uint8)
+
+
+def write_photograph(path: str | Path, image: NDArray[np.uint8]) -> None:
+    """Write an image [row, column, red green blue] as PNG; atomic.
+
+    Raises:
+        BadInput: the place cannot be written.
+        WriteFailed: the disk is full.
+    """
+    _, coded = cv2.imencode(".png", image[:, :, ::-1])
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(coded.tobytes())
