@@ -16,8 +16,8 @@ from glisson.studies.trocar.tasks import localise_corners, localise_images
 def row(source="corners", layout=RECOMMENDED, visible=4, status="converged", position=0.2, angle=0.01, **more):
     return {
         "source": source, "layout": layout, "number": 0, "visible": visible, "status": status,
-        "position_mm": position, "angle_deg": angle, "tip_mm": 2.0 * (position or 0.0), "inside90": True, "used": visible,
-        "bound_mm": 1.0, "noise_px": 0.05, "milliseconds": 0.5, "message": "", **more,
+        "position_mm": position, "angle_deg": angle, "tip_mm": 2.0 * (position or 0.0), "inside90": True,
+        "used": visible, "bound_mm": 1.0, "noise_px": 0.05, "milliseconds": 0.5, "message": "", **more,
     }  # fmt: skip
 
 
@@ -33,26 +33,41 @@ def test_silent_errors_are_counted_in_all_views_and_flags_where_three_crosses_ar
         row(visible=1, status="unobservable", position=None, angle=None) | {"inside90": None, "milliseconds": None},
         row(source="image", database_status="converged", **database),
     ]
-    found = study.conclude({}, {points[0].key: Outcome({"rows": rows})})
+    wheel = {"in_room": False, "right": True, "tip_mm": 0.5, "axis_deg": 0.1, "inside90": True, "milliseconds": 50.0,
+             "other_size_status": "bad_input", "room_tip_mm": None, "room_inside90": None}  # fmt: skip
+    hidden = wheel | dict.fromkeys(("right", "tip_mm", "axis_deg", "inside90"))
+    wheels = [
+        wheel,
+        hidden,
+        wheel | {"right": False},
+        wheel | {"in_room": True, "room_tip_mm": 1.0, "room_inside90": True},
+    ]
+    point = next(point for point in points if "in_room" in point.inputs)
+    done = {points[0].key: Outcome({"rows": rows}), point.key: Outcome({"rows": wheels})}
+    found = study.conclude({}, done)
     values = found.values
     assert (values["views"], values["rendered"], values["silent_wrong"]) == (6, 1, 2)
     assert values["flagged"] == pytest.approx(1.0 / 3.0)
     assert values["position_mm"] == {"median": 0.2, "p95": pytest.approx(0.2 + 0.9 * 5.8), "worst": 6.0}
     assert values["database"]["silent_wrong"] == 1
-    assert values["recognised"] is None
-    assert set(found.files) == {"rows.csv", "report.html", "tips.png"}
+    assert values["recognised"] == 0.5
+    told = values["recognition"]
+    assert (told["views"], told["right"], told["wrong"], told["flagged"], told["placed"]) == (4, 2, 1, 1, 1)
+    assert told["other_size_flagged"] == 1.0
+    assert set(found.files) == {"rows.csv", "instruments.csv", "report.html", "tips.png"}
 
 
 def test_all_views_are_asked_for_once():
     study = TrocarStudy.of(False, 3)
     points = study.points({})
     views = [
-        (p.task.function, p.inputs["layout"], n)
+        (p.task.function, p.inputs.get("layout", p.inputs.get("in_room")), n)
         for p in points
         for n in range(p.inputs["first"], p.inputs["first"] + p.inputs["count"])
     ]
-    assert len(views) == len(set(views)) == 10_000
+    assert len(views) == len(set(views)) == 11_000
     assert sum("images" in function for function, _, _ in views) == 1000
+    assert sum("recognise" in function for function, _, _ in views) == 1000
 
 
 def test_errors_of_a_pose_that_is_turned_by_two_degrees():

@@ -35,8 +35,8 @@ RINGS = WheelRings()
 class Instrument:
     """An instrument and its wheel, which is at a right angle to the shaft and centred on it.
 
-    The frame "instrument" has its origin in the wheel's centre and z along the shaft towards the tip, whence the wheel's
-    face is seen; sector k lies between the angles k · 60° and (k + 1) · 60° from x towards y (mm).
+    The frame "instrument" has its origin in the wheel's centre and z along the shaft towards the tip, whence the
+    wheel's face is seen; sector k lies between the angles k · 60° and (k + 1) · 60° from x towards y (mm).
 
     Args:
         name: as people call it.

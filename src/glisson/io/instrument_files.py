@@ -5,14 +5,17 @@ from typing import Any
 
 import tomli_w
 
-from glisson.core.camera import Camera
 from glisson.core.instruments import Instrument, InstrumentLibrary
 from glisson.core.trocar import Trocar
 from glisson.io.atomic import atomic_path
+from glisson.io.camera_files import read_camera
 from glisson.io.records import Record, read_record
 
 EXAMPLE_LIBRARY = Path(__file__).with_name("data") / "instruments.toml"
 """Ten instruments that come with Glisson."""
+
+EXAMPLE_TROCAR = Path(__file__).with_name("data") / "trocar" / "trocar.toml"
+"""A trocar with a wide-angle camera."""
 
 _SCHEMA = 1
 
@@ -35,49 +38,21 @@ def write_instruments(path: str | Path, library: InstrumentLibrary) -> None:
         BadInput: the place cannot be written.
         WriteFailed: the disk is full.
     """
-    _write(path, {"instruments": [_instrument_table(instrument) for instrument in library.instruments]})
+    table = {"schema": _SCHEMA, "instruments": [_instrument_table(entry) for entry in library.instruments]}
+    with atomic_path(path) as temporary:
+        temporary.write_text(tomli_w.dumps(table), encoding="utf-8")
 
 
 def read_trocar(path: str | Path) -> Trocar:
-    """Read a trocar: its camera, its pivot and its channel's axis.
+    """Read a trocar: its pivot and its channel's axis, and the camera from the file that it names, beside it.
 
     Raises:
-        BadInput: absent, damaged, or with an impossible value, named by its key path.
+        BadInput: absent, damaged, or with an impossible value, named by its key path; the same of the camera.
     """
     with read_record(Path(path), "a trocar", _SCHEMA) as record, record.building():
-        camera = record.record("camera")
-        return Trocar(
-            _camera(camera),
-            record.floats("pivot_mm", 3),
-            record.floats("axis", 3),
-            record.number("play_mm", Trocar.play_mm),
-        )
-
-
-def write_trocar(path: str | Path, trocar: Trocar) -> None:
-    """Write a trocar; atomic.
-
-    Raises:
-        BadInput: the place cannot be written.
-        WriteFailed: the disk is full.
-    """
-    camera = trocar.camera
-    table: dict[str, Any] = {
-        "width": camera.width,
-        "height": camera.height,
-        "focal_px": camera.focal_px.tolist(),
-        "centre_px": camera.centre_px.tolist(),
-        "distortion": camera.distortion.tolist(),
-    }
-    if camera.covariance is not None:
-        table["covariance"] = camera.covariance.tolist()
-    values = {"pivot_mm": trocar.pivot_mm.tolist(), "axis": trocar.axis.tolist(), "play_mm": float(trocar.play_mm)}
-    _write(path, values | {"camera": table})
-
-
-def _write(path: str | Path, values: dict[str, Any]) -> None:
-    with atomic_path(path) as temporary:
-        temporary.write_text(tomli_w.dumps({"schema": _SCHEMA} | values), encoding="utf-8")
+        camera = read_camera(Path(path).parent / record.text("camera"))
+        play = record.number("play_mm", Trocar.play_mm)
+        return Trocar(camera, record.floats("pivot_mm", 3), record.floats("axis", 3), play)
 
 
 def _instrument(record: Record) -> Instrument:
@@ -97,15 +72,3 @@ def _instrument_table(instrument: Instrument) -> dict[str, Any]:
         "wheel_mm": float(instrument.wheel_mm),
         "colours": list(instrument.colours),
     }
-
-
-def _camera(record: Record) -> Camera:
-    with record.building():
-        return Camera(
-            record.whole("width"),
-            record.whole("height"),
-            record.floats("focal_px", 2),
-            record.floats("centre_px", 2),
-            record.floats("distortion", 5),
-            record.floats("covariance", 9, 9) if record.has("covariance") else None,
-        )

@@ -6,14 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from glisson.core.arrays import FloatArray
-from glisson.core.camera import Camera
 from glisson.core.instruments import Instrument
 from glisson.core.transform import RigidTransform
 from glisson.core.trocar import Trocar
 from glisson.phantom.photograph import Sensor
-
-_CHANNEL_BESIDE_MM = 20.0
-_PIVOT_BELOW_MM = 20.0
 
 
 @dataclass(frozen=True)
@@ -57,14 +53,6 @@ class WheelScene:
 
 
 GLOVES = ((0.80, 0.80, 0.76), (0.42, 0.62, 0.78), (0.30, 0.52, 0.45), (0.62, 0.50, 0.66))
-
-
-def demo_trocar(width: int = 960, height: int = 720) -> Trocar:
-    """A trocar with a wide-angle camera of 71° across."""
-    camera = Camera(
-        width, height, [0.7 * width, 0.7 * width], [0.505 * width, 0.49 * height], [-0.22, 0.06, 1e-3, -5e-4, 0.0]
-    )
-    return Trocar(camera, [_CHANNEL_BESIDE_MM, 0.0, -_PIVOT_BELOW_MM], [0.0, 0.0, 1.0])
 
 
 def draw_scene(

@@ -2,9 +2,12 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 
-from glisson.core.errors import StageFailed
-from glisson.core.instruments import Instrument, InstrumentLibrary
+import numpy as np
+
+from glisson.core.errors import BadInput, StageFailed
+from glisson.core.instruments import SECTORS, WHEEL_COLOURS, Instrument, InstrumentLibrary
 from glisson.core.status import Status
 
 LEAST_APART = 2
@@ -18,7 +21,7 @@ Reading = Sequence[str | None]
 
 @dataclass(frozen=True)
 class Alike:
-    """Two instruments (or one and its mirror image) whose codes differ in `sectors` only, too few to tell them apart."""
+    """Two instruments (or one and its mirror image) whose codes differ in too few sectors."""
 
     one: str
     other: str
@@ -44,6 +47,26 @@ def alike_codes(library: InstrumentLibrary) -> tuple[Alike, ...]:
             pairs.append((other.name, min(_differing(one.colours, way) for way in _either_way(other.colours))))
         found += [Alike(one.name, name, sectors) for name, sectors in pairs if sectors < LEAST_APART]
     return tuple(found)
+
+
+def free_code(library: InstrumentLibrary) -> tuple[str, ...]:
+    """Colours for one more instrument: as far from all others, and from their own other ways round, as may be.
+
+    Raises:
+        BadInput: no code is left that can be told from all others.
+    """
+    codes = np.array(list(product(range(len(WHEEL_COLOURS)), repeat=SECTORS)))
+    turns = range(SECTORS)
+    ways = [np.roll(codes[:, ::step], turn, axis=1) for step in (1, -1) for turn in turns]
+    own = np.min([(codes != way).sum(axis=1) for way in ways[1:]], axis=0)
+    others = np.full(len(codes), SECTORS)
+    for one in library.instruments:
+        numbers = np.array([WHEEL_COLOURS.index(colour) for colour in one.colours])
+        others = np.minimum(others, np.min([(way != numbers).sum(axis=1) for way in ways], axis=0))
+    best = int(np.argmax(np.where(own >= LEAST_APART, others, -1)))
+    if own[best] < LEAST_APART or others[best] < LEAST_APART:
+        raise BadInput("No colour code is left that can be told from all others in the library.")
+    return tuple(WHEEL_COLOURS[number] for number in codes[best])
 
 
 def instrument_of(reading: Reading, library: InstrumentLibrary) -> tuple[Instrument, int]:

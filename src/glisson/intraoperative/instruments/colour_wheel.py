@@ -16,7 +16,7 @@ from glisson.intraoperative.cameras.projection import undistorted
 from glisson.intraoperative.instruments.circle_pose import circle_poses, conic_through
 from glisson.intraoperative.instruments.codes import instrument_of
 from glisson.intraoperative.instruments.rim_edges import rim_edges, white_paper
-from glisson.intraoperative.instruments.wheel_colours import read_sectors
+from glisson.intraoperative.instruments.wheel_colours import paper_colour, read_sectors
 from glisson.intraoperative.instruments.wheel_finding import find_wheel
 from glisson.intraoperative.instruments.wheel_pose import WheelPose, disagreement, fitted_pose, past_pivot
 
@@ -64,7 +64,8 @@ class ColourWheel:
         instrument, begin = instrument_of(reading, library)
         turn = angle - begin * 2.0 * np.pi / SECTORS
         x = clearest.rotation @ [np.cos(turn), np.sin(turn), 0.0]
-        return _placed(paper, trocar, instrument, [_sized(fit.pose, instrument) for fit in either], x)
+        balanced = white_paper(image, paper_colour(image, camera, clearest, 1.0))
+        return _placed(balanced, trocar, instrument, [_sized(fit.pose, instrument) for fit in either], x)
 
 
 def _placed(

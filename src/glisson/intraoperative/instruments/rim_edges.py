@@ -32,7 +32,7 @@ class RimEdges:
         predicted_px: (n, 2) where the pose has them.
         normals: (n, 2) unit vectors across the circles in the image, outwards.
         off_px: (n,) how far the edge is beyond, along the normal.
-        circle: (n,) which of `CIRCLES`.
+        growing: (n,) 1 where the white lies inside the circle, so that it grows outwards, −1 where it lies outside.
         share: of the points looked for that have an edge.
     """
 
@@ -40,13 +40,22 @@ class RimEdges:
     predicted_px: FloatArray
     normals: FloatArray
     off_px: FloatArray
-    circle: NDArray[np.intp]
+    growing: FloatArray
     share: float
 
 
-def white_paper(image: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """The darkest channel (h, w) of an image: bright where the paper is white, dark under any ink."""
-    return image.min(axis=2).astype(np.float32)
+def white_paper(image: NDArray[np.uint8], white: FloatArray | None = None) -> NDArray[np.float32]:
+    """The darkest channel (h, w) of an image: bright where the paper is white, dark under any ink.
+
+    Args:
+        image: (h, w, 3).
+        white: what the paper looks like (3,). Without it, coloured light makes one channel the darkest on paper and
+            another one on ink, which shifts the edge between them by some tenths of a pixel.
+    """
+    balance = np.ones(3) if white is None else white.max() / white
+    channels = [balance[n] * image[:, :, n].astype(np.float32) for n in range(3)]
+    darkest: NDArray[np.float32] = np.minimum(np.minimum(channels[0], channels[1]), channels[2]).astype(np.float32)
+    return darkest
 
 
 def rim_edges(
@@ -80,7 +89,7 @@ def rim_edges(
     inside = ((away > reach) & (away < np.array([camera.width, camera.height]) - 1.0 - reach)).all(axis=1)
     typical = np.median(strength[inside]) if inside.any() else np.inf
     good = inside & np.isfinite(off) & (strength > _LEAST_CONTRAST * typical)
-    return RimEdges(points[good], away[good], normals[good], off[good], circle[good], float(good.mean()))
+    return RimEdges(points[good], away[good], normals[good], off[good], -signs[good], float(good.mean()))
 
 
 def _across(

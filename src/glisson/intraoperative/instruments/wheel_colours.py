@@ -14,8 +14,8 @@ _HUES = {"red": 0.0, "yellow": 53.0, "green": 138.0, "blue": 222.0}
 """Hues in degrees under white light."""
 _NEAR_HUE = 30.0
 _LEAST_SATURATION = 0.45
-_LEAST_VALUE = 0.42
-"""Blood is darker than red ink."""
+_LEAST_VALUE = {"red": 0.62, "yellow": 0.62, "green": 0.4, "blue": 0.5}
+"""Shares of white's light. Blood is darker than red ink, and on yellow it would make red."""
 _DEGREES = 360
 _RADII = 9
 _READABLE = 0.3
@@ -27,9 +27,10 @@ _SURE = 0.7
 def read_sectors(
     image: NDArray[np.uint8], camera: Camera, trocar_from_wheel: RigidTransform, radius_mm: float
 ) -> tuple[tuple[str | None, ...], float]:
-    """The colours of the sectors anticlockwise, None where one cannot be read; and the angle (rad) where the first begins.
+    """The colours of the sectors anticlockwise, and the angle (rad) where the first begins.
 
-    The wheel may be turned in any way; the angle is that in the given pose, below 60°.
+    A colour is None where it cannot be read. The wheel may be turned in any way; the angle, below 60°, is from the x of
+    the given pose.
 
     Args:
         image: (h, w, 3).
@@ -51,6 +52,16 @@ def read_sectors(
     return tuple(_colour(counts[:, sector], wide * _RADII) for sector in range(SECTORS)), float(np.radians(begin))
 
 
+def paper_colour(
+    image: NDArray[np.uint8], camera: Camera, trocar_from_wheel: RigidTransform, radius_mm: float
+) -> FloatArray:
+    """What the wheel's white paper looks like (3,): the brighter half of its outer ring."""
+    ring = _white_ring(image, camera, trocar_from_wheel, radius_mm)
+    brightness = ring.min(axis=1)
+    colour: FloatArray = np.median(ring[brightness >= np.median(brightness)], axis=0).clip(1.0)
+    return colour
+
+
 def _colour(counts: NDArray[np.intp], all_of_it: int) -> str | None:
     readable, most = counts.sum(), counts.max()
     if readable < _READABLE * all_of_it or most < _SURE * readable:
@@ -63,19 +74,25 @@ def _labels(image: NDArray[np.uint8], camera: Camera, pose: RigidTransform, radi
     margin = 0.2 * (RINGS.outer - RINGS.inner)
     radii = np.linspace(RINGS.inner + margin, RINGS.outer - margin, _RADII)
     ink = _seen(image, camera, pose, radii * radius_mm)
-    white = _white(_seen(image, camera, pose, np.array([0.5 * (RINGS.white + RINGS.outer)]) * radius_mm)[0])
+    white = _white(_white_ring(image, camera, pose, radius_mm))
     shares = ink / white
     value, least = shares.max(axis=2), shares.min(axis=2)
     chroma = np.maximum(value - least, 1e-6)
     red, green, blue = np.moveaxis(shares, 2, 0)
-    sixth = np.where(
-        value == red, (green - blue) / chroma, np.where(value == green, 2.0 + (blue - red) / chroma, 4.0 + (red - green) / chroma)
-    )  # fmt: skip
+    from_green_on = np.where(value == green, 2.0 + (blue - red) / chroma, 4.0 + (red - green) / chroma)
+    sixth = np.where(value == red, (green - blue) / chroma, from_green_on)
     hue = 60.0 * sixth % 360.0
     off = np.stack([np.abs((hue - centre + 180.0) % 360.0 - 180.0) for centre in _HUES.values()])
     labels = off.argmin(axis=0)
-    clear = (off.min(axis=0) < _NEAR_HUE) & (value > _LEAST_VALUE) & (chroma > _LEAST_SATURATION * value)
+    bright = value > np.array(list(_LEAST_VALUE.values()))[labels]
+    clear = (off.min(axis=0) < _NEAR_HUE) & bright & (chroma > _LEAST_SATURATION * value)
     return np.where(clear, labels, -1)
+
+
+def _white_ring(image: NDArray[np.uint8], camera: Camera, pose: RigidTransform, radius_mm: float) -> FloatArray:
+    """The image (degrees, 3) in the middle of the outer white ring."""
+    ring: FloatArray = _seen(image, camera, pose, np.array([0.5 * (RINGS.white + RINGS.outer)]) * radius_mm)[0]
+    return ring
 
 
 def _white(ring: FloatArray) -> FloatArray:

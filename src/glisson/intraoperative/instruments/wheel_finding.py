@@ -1,6 +1,6 @@
 """Finds a wheel in an image: an ellipse of white paper between black and ink."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -16,12 +16,12 @@ _OVER = 6.0
 """Paper is brighter than the mean about it by so many grey levels."""
 _LEAST_PX = 20
 _LEAST_POINTS = 40
-_TRIES = 40
+_TRIES = 100
 _NEAR_PX = 1.2
 _LEAST_ARC = 0.3
 _FLATTEST = 0.6
 """Instruments lean by a few degrees only, so that wheels look round."""
-_GOOD_SCORE = 0.4
+_GOOD_SCORE, _SURE_SCORE = 0.4, 0.75
 _ANGLES = 72
 
 
@@ -54,13 +54,15 @@ def find_wheel(paper: NDArray[np.float32]) -> FoundEllipse | None:
         ellipse = _ellipse_of(outline, rng)
         if ellipse is None:
             continue
-        # An outline of the white ring is its outer or its inner edge.
-        for share in (RINGS.white, RINGS.outer):
+        # An outline is an edge of the outer white ring or of the inner one, of which more may be free.
+        for share in (RINGS.white, RINGS.outer, RINGS.inner):
             middle, axes, angle = ellipse
             found = FoundEllipse(middle, axes * RINGS.white / share, angle, 0.0)
             score = _score(paper, found)
             if score > (best.score if best else _GOOD_SCORE):
                 best = FoundEllipse(found.middle, found.half_axes, angle, score)
+        if best is not None and best.score > _SURE_SCORE:
+            break
     return best
 
 
@@ -83,7 +85,7 @@ def _ellipse_of(outline: FloatArray, rng: np.random.Generator) -> tuple[FloatArr
     best: NDArray[np.bool_] | None = None
     for _ in range(_TRIES):
         # Points of one stretch are on one arc more often than points from anywhere.
-        begin, stretch = rng.integers(len(points)), int(len(points) * rng.uniform(0.3, 1.0))
+        begin, stretch = rng.integers(len(points)), max(12, int(len(points) * rng.uniform(0.1, 1.0)))
         chosen = (begin + rng.choice(stretch, 6, replace=False)) % len(points)
         near = _near(points, cv2.fitEllipseDirect(points[chosen]))
         if near is not None and (best is None or near.sum() > best.sum()):
@@ -101,7 +103,7 @@ def _ellipse_of(outline: FloatArray, rng: np.random.Generator) -> tuple[FloatArr
 
 
 def _near(
-    points: NDArray[np.float32], ellipse: tuple[tuple[float, float], tuple[float, float], float]
+    points: NDArray[np.float32], ellipse: tuple[Sequence[float], Sequence[float], float]
 ) -> NDArray[np.bool_] | None:
     """Which points (n,) lie on an ellipse; None where it cannot be a wheel's."""
     middle, sizes, turn = np.array(ellipse[0]), 0.5 * np.array(ellipse[1]), np.radians(ellipse[2])

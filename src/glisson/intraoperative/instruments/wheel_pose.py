@@ -24,9 +24,11 @@ _STEPS = 12
 _WINDOWS = (0.12, 0.07, 0.05, 0.035)
 """How far edges are looked for after each step, in wheel radii."""
 _LEAST_NOISE_PX = 0.03
-_INDEPENDENT = 0.2
+_INDEPENDENT = 0.12
 """Of neighbouring edges this share tells something new: blur and the pixel grid shift them together."""
 _TUKEY = 4.0
+_GROWTH_PX = 0.3
+"""Standard deviation of how far white has grown over its edges, by the camera's gamma, glow or spread ink."""
 
 EdgeFinder = Callable[[RigidTransform, float], RimEdges]
 """Edges near a pose within a window."""
@@ -56,6 +58,7 @@ def fitted_pose(
 ) -> WheelPose:
     """The pose that brings the circles of a wheel onto the edges; with a trocar its axis passes the pivot, too.
 
+    How far white has grown is estimated, too: it widens a white ring to both sides, so that it is no change of size.
     The covariance has the noise of the edges, the pivot's play and, where it is known, the camera's covariance.
 
     Args:
@@ -68,27 +71,27 @@ def fitted_pose(
     Raises:
         StageFailed: too few edges, as where most of the wheel is hidden.
     """
-    pose = start
+    pose, growth = start, 0.0
     for step in range(_STEPS):
         edges = find(pose, _WINDOWS[min(step, len(_WINDOWS) - 1)])
         if edges.share < LEAST_SHARE:
             raise StageFailed("Too little of the wheel's rims can be seen.", Status.UNOBSERVABLE)
-        system = _System.of(camera, pose, radius_mm, edges, trocar)
-        change = np.linalg.solve(system.information, system.pull)
-        pose = moved(pose, change)
+        system = _System.of(camera, pose, growth, radius_mm, edges, trocar)
+        change = np.asarray(np.linalg.solve(system.information, system.pull), dtype=np.float64)
+        pose, growth = moved(pose, change[:6]), growth + float(change[6])
         if step >= len(_WINDOWS) and np.abs(change).max() < 1e-5:
             break
-    inverse = np.linalg.inv(system.information)
-    covariance = inverse
+    inverse = np.asarray(np.linalg.inv(system.information), dtype=np.float64)
+    covariance = inverse[:6, :6]
     if camera.covariance is not None:
-        by_camera = inverse @ system.by_camera
-        covariance = inverse + by_camera @ camera.covariance @ by_camera.T
+        by_camera = (inverse @ system.by_camera)[:6]
+        covariance = covariance + by_camera @ camera.covariance @ by_camera.T
     known = RigidTransform(pose.target, pose.source, pose.rotation, pose.translation_mm, covariance)
     return WheelPose(known, edges, system.noise_px)
 
 
 def past_pivot(pose: RigidTransform, trocar: Trocar) -> tuple[FloatArray, FloatArray]:
-    """How far (2,) an instrument's axis passes the pivot by, along its x and y, and the derivative (2, 6) by d and e."""
+    """How far (2,) an axis passes the pivot by, along its x and y, and the derivative (2, 6) by d and e."""
     x, y = pose.rotation[:, 0], pose.rotation[:, 1]
     away = trocar.pivot_mm - pose.translation_mm
     off = np.array([x @ away, y @ away])
@@ -115,7 +118,10 @@ def moved(pose: RigidTransform, change: FloatArray) -> RigidTransform:
 
 @dataclass(frozen=True, eq=False)
 class _System:
-    """Normal equations of one step: information (6, 6), pull (6,), and by how the camera errs (6, 9)."""
+    """Normal equations of one step: information (7, 7), pull (7,), and by how the camera errs (7, 9).
+
+    The unknowns are those of the pose and how far white has grown.
+    """
 
     information: FloatArray
     pull: FloatArray
@@ -124,23 +130,33 @@ class _System:
 
     @classmethod
     def of(
-        cls, camera: Camera, pose: RigidTransform, radius_mm: float, edges: RimEdges, trocar: Trocar | None
+        cls,
+        camera: Camera,
+        pose: RigidTransform,
+        growth_px: float,
+        radius_mm: float,
+        edges: RimEdges,
+        trocar: Trocar | None,
     ) -> "_System":
         _, jacobian = project_with_jacobian(camera, pose, edges.points * radius_mm)
-        rows = np.einsum("ni,nij->nj", edges.normals, jacobian)
-        noise = max(1.4826 * float(np.median(np.abs(edges.off_px))), _LEAST_NOISE_PX)
-        weights = (1.0 - np.minimum(np.abs(edges.off_px) / (_TUKEY * noise), 1.0) ** 2) ** 2
+        by_all = np.einsum("ni,nij->nj", edges.normals, jacobian)
+        rows = np.column_stack([by_all[:, :6], edges.growing])
+        off = edges.off_px - growth_px * edges.growing
+        noise = max(1.4826 * float(np.median(np.abs(off))), _LEAST_NOISE_PX)
+        weights = (1.0 - np.minimum(np.abs(off) / (_TUKEY * noise), 1.0) ** 2) ** 2
         kept = weights > 0.0
-        noise = max(float(np.sqrt(np.average(edges.off_px[kept] ** 2, weights=weights[kept]))), _LEAST_NOISE_PX)
+        noise = max(float(np.sqrt(np.average(off[kept] ** 2, weights=weights[kept]))), _LEAST_NOISE_PX)
         # Wheels that are small in the image have fewer pixels on a circle than there are edges asked for.
         around = np.linalg.norm(np.ptp(edges.predicted_px, axis=0)) * np.pi / np.sqrt(2.0)
         shared = _INDEPENDENT * min(1.0, around / ANGLES) / noise**2
-        weighted = rows[:, :6] * (weights * shared)[:, None]
-        axis = np.concatenate([pose.rotation[:, 2], np.zeros(3)])
-        information = weighted.T @ rows[:, :6] + np.outer(axis, axis) / ROLL_RAD**2
-        pull = weighted.T @ edges.off_px
+        weighted = rows * (weights * shared)[:, None]
+        axis = np.concatenate([pose.rotation[:, 2], np.zeros(4)])
+        information = weighted.T @ rows + np.outer(axis, axis) / ROLL_RAD**2
+        information[6, 6] += 1.0 / _GROWTH_PX**2
+        pull = weighted.T @ off
+        pull[6] -= growth_px / _GROWTH_PX**2
         if trocar is not None:
-            off, by_pose = past_pivot(pose, trocar)
-            information += by_pose.T @ by_pose / trocar.play_mm**2
-            pull -= by_pose.T @ off / trocar.play_mm**2
-        return cls(information, pull, weighted.T @ rows[:, 6:15], noise)
+            past, by_pose = past_pivot(pose, trocar)
+            information[:6, :6] += by_pose.T @ by_pose / trocar.play_mm**2
+            pull[:6] -= by_pose.T @ past / trocar.play_mm**2
+        return cls(information, pull, weighted.T @ by_all[:, 6:15], noise)

@@ -11,6 +11,7 @@ from glisson.studies.page import png
 from glisson.studies.point import Outcome, Point
 from glisson.studies.study import Conclusion
 from glisson.studies.tables import as_csv
+from glisson.studies.trocar.recognition import RECOGNITION, recognition_values
 from glisson.studies.trocar.rooms import ANY, RECOMMENDED, SURVEYED
 from glisson.studies.trocar.tasks import CORNERS, IMAGES
 from glisson.studies.trocar.telling import as_lines, as_page, draw_tips
@@ -19,6 +20,9 @@ WRONG_MM, WRONG_DEG = 5.0, 1.0
 IMAGE_COUNT, CORNER_COUNT = 1000, 9000
 QUICK_IMAGES, QUICK_CORNERS = 40, 600
 _IMAGE_BLOCK, _CORNER_BLOCK = 10, 150
+WHEELS, QUICK_WHEELS = (800, 200), (20, 10)
+"""Views of instruments: before a ceiling out of focus, and before a room with its crosses."""
+_WHEEL_BLOCK = 10
 SHARES = {RECOMMENDED: 0.7, ANY: 0.2, SURVEYED: 0.1}
 """Parts of the views by layout."""
 
@@ -34,15 +38,20 @@ class TrocarStudy:
     seed: int = 0
     images: int = IMAGE_COUNT
     corners: int = CORNER_COUNT
+    wheels: tuple[int, int] = WHEELS
 
     @classmethod
     def of(cls, quick: bool, seed: int) -> "TrocarStudy":
         """The quick or the usual form."""
-        return cls(seed, QUICK_IMAGES, QUICK_CORNERS) if quick else cls(seed)
+        return cls(seed, QUICK_IMAGES, QUICK_CORNERS, QUICK_WHEELS) if quick else cls(seed)
 
     def preparations(self) -> Sequence[Point]:
         """One view, so that all is compiled before."""
-        return [Point(IMAGES, {"stream": self.seed, "layout": RECOMMENDED, "first": self.images, "count": 1})]
+        wheel = {"stream": self.seed, "in_room": True, "first": self.wheels[1], "count": 1}
+        return [
+            Point(IMAGES, {"stream": self.seed, "layout": RECOMMENDED, "first": self.images, "count": 1}),
+            Point(RECOGNITION, wheel),
+        ]
 
     def points(self, prepared: Mapping[str, Outcome]) -> Sequence[Point]:
         """Blocks of views, of all kinds in turn."""
@@ -60,13 +69,22 @@ class TrocarStudy:
                         for first in range(0, count, size)
                     ]
                 )
+        for in_room, count in zip((False, True), self.wheels, strict=True):
+            inputs = {"stream": self.seed, "in_room": in_room}
+            groups.append(
+                [
+                    Point(RECOGNITION, {**inputs, "first": first, "count": min(_WHEEL_BLOCK, count - first)}, 5.0)
+                    for first in range(0, count, _WHEEL_BLOCK)
+                ]
+            )
         return [point for turn in zip_longest(*groups) for point in turn if point is not None]
 
     def conclude(self, prepared: Mapping[str, Outcome], done: Mapping[str, Outcome]) -> Conclusion:
         """Errors of what is not flagged, by layout, source and number of crosses, and all silent errors."""
         points = self.points(prepared)
         outcomes = [done[point.key] for point in points if point.key in done]
-        rows = [row for outcome in outcomes for row in outcome.values.get("rows", ())]
+        all_rows = [row for outcome in outcomes for row in outcome.values.get("rows", ())]
+        rows, wheels = ([row for row in all_rows if ("in_room" in row) is is_wheel] for is_wheel in (False, True))
         best = [row for row in rows if row["layout"] == RECOMMENDED]
         enough = [row for row in best if row["visible"] >= 3]
         images = [row for row in rows if row["source"] == "image"]
@@ -80,7 +98,8 @@ class TrocarStudy:
             "angle_deg": spread(best, "angle_deg"),
             "tip_mm": spread(best, "tip_mm"),
             "coverage90": _coverage(best),
-            "recognised": None,
+            "recognised": sum(bool(row["right"]) for row in wheels) / len(wheels) if wheels else None,
+            "recognition": recognition_values(wheels),
             "milliseconds": {
                 "image": _milliseconds(images),
                 "corners": _milliseconds([row for row in rows if row["source"] == "corners"]),
@@ -94,6 +113,7 @@ class TrocarStudy:
         shown = draw_tips(rows)
         names = list(dict.fromkeys(name for row in rows for name in row))
         files = {
+            "instruments.csv": as_csv(wheels),
             "rows.csv": as_csv([{name: row.get(name) for name in names} for row in rows]),
             "report.html": as_page(values, shown),
             "tips.png": png(shown),

@@ -43,11 +43,32 @@ def as_lines(values: Mapping[str, Any]) -> list[str]:
             f"{_spread(database['tip_mm'], 2, ' mm')}, flagged {_percent(database['flagged'])}, silently wrong "
             f"{database['silent_wrong']}"
         )
-    if values["recognised"] is None:
-        lines.append("note      instruments are not part of this run")
+    lines += _instruments(values["recognition"])
     lines += [f"failed    {message}" for message in values["failed"]]
     if values["unfinished"]:
         lines.append(f"note      {values['unfinished']} blocks of views are not done yet; run again to go on")
+    return lines
+
+
+def _instruments(found: Mapping[str, Any]) -> list[str]:
+    """Names, and how far the tip is off in the trocar's frame and, by the crosses of the same picture, in the room."""
+    if not found["views"]:
+        return []
+    lines = [
+        f"tools     {found['right']} of {found['views']} instruments recognised, {found['flagged']} flagged, "
+        f"{found['wrong']} with a wrong name; of wheels taken for wider ones by a quarter "
+        f"{_percent(found['other_size_flagged'])} flagged"
+    ]
+    for words, name, digits, unit in (
+        ("tip from the trocar", "tip_mm", 2, " mm"), ("axis", "axis_deg", 3, "°"),
+        ("tip in the room", "room_tip_mm", 2, " mm"), ("time", "milliseconds", 0, " ms"),
+    ):  # fmt: skip
+        if found[name] is not None:
+            lines.append(f"tools     {words}: {_spread(found[name], digits, unit)}")
+    lines.append(
+        f"coverage  {_percent(found['coverage90'])} of the tips in 90 % ellipsoids, in the room "
+        f"{_percent(found['room_coverage90'])} of {found['placed']}"
+    )
     return lines
 
 

@@ -1,0 +1,62 @@
+"""`glisson markers`: wheels of instruments, crosses and calibration boards as PDF at true scale."""
+
+import argparse
+from pathlib import Path
+
+from glisson.cli.command import Command
+from glisson.cli.console import Answer
+from glisson.cli.progress import StageLines
+from glisson.framework.instruments import library_or_example
+from glisson.framework.marker_sheets import board_sheet, cross_sheets, wheel_sheet
+from glisson.intraoperative.cameras.boards import board_from_text
+from glisson.io.layout_files import read_layout
+from glisson.io.true_scale_pdf import SENTENCE, Sheet, write_true_scale_pdf
+
+_KEYS = ("file", "pages", "papers")
+
+
+def _add_arguments(parser: argparse.ArgumentParser) -> None:
+    kinds = parser.add_subparsers(dest="kind", required=True, metavar="WHAT", parser_class=type(parser))
+    wheel = kinds.add_parser("wheel", help="wheels of instruments", allow_abbrev=False)
+    wheel.add_argument("names", metavar="NAME", nargs="*", help="of instruments; by default all of the library")
+    wheel.add_argument("--library", metavar="FILE", help="instruments.toml; by default the one that comes with Glisson")
+    crosses = kinds.add_parser("crosses", help="the crosses of a layout", allow_abbrev=False)
+    crosses.add_argument("layout", metavar="LAYOUT", help="layout.toml")
+    board = kinds.add_parser("board", help="a calibration board", allow_abbrev=False)
+    board.add_argument(
+        "board", metavar="BOARD", help="such as chessboard:9x6:20, dots:10x8:15 or charuco:9x12:20:15:4X4_250"
+    )
+    for made in (wheel, crosses, board):
+        made.add_argument("--out", metavar="PDF", help="by default wheel.pdf, crosses.pdf or board.pdf")
+        made.add_argument("--json", action="store_true", help="print one JSON object on stdout, all else on stderr")
+        made.add_argument("--debug", action="store_true", help=argparse.SUPPRESS)
+
+
+def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
+    file = Path(arguments.out or f"{arguments.kind}.pdf")
+    sheets = _sheets(arguments)
+    papers = write_true_scale_pdf(file, sheets)
+    listed = [f"{sheet.title} on {paper}" for sheet, paper in zip(sheets, papers, strict=True)]
+    values = {"file": str(file), "pages": len(sheets), "papers": list(papers)}
+    return Answer(values, "\n".join([*listed, SENTENCE, f"written   {file}"]))
+
+
+def _sheets(arguments: argparse.Namespace) -> list[Sheet]:
+    if arguments.kind == "crosses":
+        return [sheet for cross in read_layout(arguments.layout).crosses for sheet in cross_sheets(cross)]
+    if arguments.kind == "board":
+        return [board_sheet(board_from_text(arguments.board))]
+    library = library_or_example(arguments.library)
+    chosen = [library.named(name) for name in arguments.names] or library.instruments
+    return [wheel_sheet(instrument) for instrument in chosen]
+
+
+COMMAND = Command(
+    "markers",
+    "  glisson markers wheel grasper hook --library instruments.toml\n"
+    "  glisson markers crosses layout.toml --out crosses.pdf\n"
+    "  glisson markers board charuco:9x12:20:15:4X4_250 --json",
+    _add_arguments,
+    _run,
+    _KEYS,
+)
