@@ -38,6 +38,7 @@ COMMANDS = {
     "run": "bring a case up to date, from the scan to the report",
     "couinaud": "divide the liver into Couinaud's segments by its veins and named landmarks",
     "resections": "list what each liver resection would take of the segments, and what would remain",
+    "calibrate": "calibrate a camera, hand and eye, a tool's tip or a scope's geometry",
     "export": "write the labels of a case as one segmentation for other programs (3D Slicer, DICOM)",
     "deidentify": "copy DICOM files without what tells who the patient is (the standard's basic profile)",
     "layout": "propose where crosses should hang in a room, or measure where they do",

@@ -29,7 +29,7 @@ def read_camera(path: str | Path) -> Camera:
             record.whole("height"),
             record.floats("focal_px", 2),
             record.floats("centre_px", 2),
-            record.floats("distortion", 5),
+            record.floats("distortion", 5) if record.has("distortion") else np.zeros(5),
             record.floats("covariance", 9, 9) if record.has("covariance") else None,
         )
 

@@ -18,10 +18,11 @@ INTRINSIC = 4
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """Points (n, 3) of the board in mm and the pixels (n, 2) at which they were found."""
+    """Points (n, 3) of the board in mm, the pixels (n, 2) at which they were found, and how much each counts (n,)."""
 
     points_mm: FloatArray
     pixels: FloatArray
+    weights: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,10 +69,12 @@ def _equations(bundle: Bundle, seen: Sequence[Seen]) -> NormalEquations:
     matrix, gradient, cost = np.zeros((size, size)), np.zeros(size), 0.0
     for number, (one, pose) in enumerate(zip(seen, bundle.poses, strict=True)):
         pixels, jacobian = project_with_jacobian(bundle.camera, pose, one.points_mm)
-        off = (pixels - one.pixels).ravel()
+        root = np.sqrt(one.weights)[:, None]
+        off = (root * (pixels - one.pixels)).ravel()
         own = len(free) + 6 * number + np.arange(6)
         columns = np.concatenate([np.arange(len(free)), own])
-        rows = np.concatenate([jacobian[:, :, 6 + free], jacobian[:, :, :6]], axis=2).reshape(len(off), -1)
+        rows = np.concatenate([jacobian[:, :, 6 + free], jacobian[:, :, :6]], axis=2) * root[:, :, None]
+        rows = rows.reshape(len(off), -1)
         matrix[np.ix_(columns, columns)] += rows.T @ rows
         gradient[columns] += rows.T @ off
         cost += 0.5 * float(off @ off)

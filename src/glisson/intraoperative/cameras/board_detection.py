@@ -60,13 +60,23 @@ def _first_square_black(grey: NDArray[np.uint8], grid: FloatArray) -> FloatArray
 
 
 def _dots(grey: NDArray[np.uint8], board: Board) -> FloatArray | None:
-    flags = cv2.CALIB_CB_SYMMETRIC_GRID if board.kind == "dots" else cv2.CALIB_CB_ASYMMETRIC_GRID
+    kind = cv2.CALIB_CB_SYMMETRIC_GRID if board.kind == "dots" else cv2.CALIB_CB_ASYMMETRIC_GRID
     detector = cv2.SimpleBlobDetector.create(_round_blobs(grey.size))
     for shown in (grey, np.subtract(255, grey)):  # dark dots, then bright ones
-        found, centres = cv2.findCirclesGrid(shown, (board.columns, board.rows), flags=flags, blobDetector=detector)
-        if found:
-            return np.asarray(centres.reshape(-1, 2), dtype=np.float64)
+        for way in (cv2.CALIB_CB_CLUSTERING, 0):  # the second bears more that is no dot
+            size = (board.columns, board.rows)
+            found, centres = cv2.findCirclesGrid(shown, size, flags=kind | way, blobDetector=detector)
+            if found:
+                return _seen_from_the_front(np.asarray(centres.reshape(-1, 2), dtype=np.float64), board)
     return None
+
+
+def _seen_from_the_front(pixels: FloatArray, board: Board) -> FloatArray:
+    """The dots in an order in which columns run clockwise of rows, as they do for who looks at the print."""
+    flat, _ = cv2.findHomography(board.points_mm[:, :2], pixels)
+    if np.linalg.det(flat[:2, :2]) > 0.0:
+        return pixels
+    return pixels.reshape(board.rows, board.columns, 2)[:, ::-1].reshape(-1, 2)
 
 
 def _round_blobs(pixels: int) -> cv2.SimpleBlobDetector.Params:

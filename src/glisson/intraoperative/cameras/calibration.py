@@ -63,7 +63,7 @@ class CameraCalibration:
 def calibrate_camera(views: Sequence[BoardView], width: int, height: int) -> CameraCalibration:
     """Calibrate by Zhang's closed form (2000) and a bundle adjustment.
 
-    Of the sets of distortion terms the one with the least Bayesian information criterion (Schwarz 1978) is kept.
+    Of the sets of distortion terms the one with the least information criterion of Akaike (1974) is kept.
 
     Args:
         views: three or more, of boards held at an angle.
@@ -77,18 +77,23 @@ def calibrate_camera(views: Sequence[BoardView], width: int, height: int) -> Cam
     if len(views) < 3:
         raise BadInput(f"{len(views)} views of the board are too few to calibrate a camera; take 10 or more, tilted.")
     _check_inside(views, width, height)
-    seen = [Seen(view.points_mm, view.pixels) for view in views]
+    seen = [Seen(view.points_mm, view.pixels, np.ones(len(view.pixels))) for view in views]
     best = _best_bundle(_start(seen, width, height), seen)
-    used = [np.ones(len(view.pixels), dtype=np.bool_) for view in views]
-    for _ in range(3):
-        kept = _within(best.state.residuals(Seen(view.points_mm, view.pixels) for view in views))
-        if all(np.array_equal(now, before) for now, before in zip(kept, used, strict=True)):
+    used = _within(best.state.residuals(seen))
+    if not all(one.all() for one in used):
+        used = _within(_robust(best.state, seen).residuals(seen))
+    for _ in range(5):
+        if all(one.all() for one in used):
             break
-        _check_enough(views, kept)
-        used = kept
-        seen = [Seen(view.points_mm[keep], view.pixels[keep]) for view, keep in zip(views, used, strict=True)]
-        best = _best_bundle(best.state, seen)
-    return _told(best, views, used)
+        _check_enough(views, used)
+        kept = [
+            Seen(one.points_mm[keep], one.pixels[keep], one.weights[keep]) for one, keep in zip(seen, used, strict=True)
+        ]
+        best, before = _best_bundle(best.state, kept), used
+        used = _within(best.state.residuals(seen))
+        if all(np.array_equal(now, then) for now, then in zip(used, before, strict=True)):
+            break
+    return _told(best, views, seen, used)
 
 
 def _start(seen: Sequence[Seen], width: int, height: int) -> Bundle:
@@ -115,12 +120,13 @@ def _best_bundle(start: Bundle, seen: Sequence[Seen]) -> _Adjusted:
     count = 2 * sum(len(view.pixels) for view in seen)
     best: _Adjusted | None = None
     least = np.inf
-    state = Bundle(start.camera, start.poses, ())
+    given = start.camera
+    state = Bundle(Camera(given.width, given.height, given.focal_px, given.centre_px), start.poses, ())
     for terms in DISTORTIONS:
         found = adjusted_bundle(Bundle(state.camera, state.poses, terms), seen)
         state = found.state
         unknowns = len(found.equations.matrix)
-        criterion = count * np.log(2.0 * found.equations.cost / count) + unknowns * np.log(count)
+        criterion = count * np.log(2.0 * found.equations.cost / count) + 2.0 * unknowns
         if criterion < least:
             variance = 2.0 * found.equations.cost / max(count - unknowns, 1)
             least, best = criterion, _Adjusted(state, found.equations.matrix, float(np.sqrt(variance)))
@@ -128,11 +134,28 @@ def _best_bundle(start: Bundle, seen: Sequence[Seen]) -> _Adjusted:
     return best
 
 
+def _robust(bundle: Bundle, seen: Sequence[Seen]) -> Bundle:
+    """The bundle to which points that fit badly hardly matter, by weights after Cauchy renewed ten times."""
+    for _ in range(10):
+        lengths = [np.linalg.norm(rows, axis=1) for rows in bundle.residuals(seen)]
+        reach = 2.0 * _sigma(lengths)
+        weighted = [
+            Seen(one.points_mm, one.pixels, 1.0 / (1.0 + (own / reach) ** 2))
+            for one, own in zip(seen, lengths, strict=True)
+        ]
+        bundle = adjusted_bundle(bundle, weighted).state
+    return bundle
+
+
+def _sigma(lengths: Sequence[FloatArray]) -> float:
+    """Standard deviation of a coordinate from the lengths of residuals, by a median that outliers cannot spoil."""
+    return max(float(np.median(np.concatenate(lengths))) / _MEDIAN_NORM, 1e-3)
+
+
 def _within(residuals: Sequence[FloatArray]) -> list[NDArray[np.bool_]]:
-    """Which points are the board's, by a standard deviation that the others cannot spoil."""
+    """Which points are the board's."""
     lengths = [np.linalg.norm(rows, axis=1) for rows in residuals]
-    sigma = max(float(np.median(np.concatenate(lengths))) / _MEDIAN_NORM, 1e-3)
-    return [one < _OUTLYING * sigma for one in lengths]
+    return [one < _OUTLYING * _sigma(lengths) for one in lengths]
 
 
 def _check_inside(views: Sequence[BoardView], width: int, height: int) -> None:
@@ -150,7 +173,9 @@ def _check_enough(views: Sequence[BoardView], kept: Sequence[NDArray[np.bool_]])
             )
 
 
-def _told(best: _Adjusted, views: Sequence[BoardView], used: Sequence[NDArray[np.bool_]]) -> CameraCalibration:
+def _told(
+    best: _Adjusted, views: Sequence[BoardView], seen: Sequence[Seen], used: Sequence[NDArray[np.bool_]]
+) -> CameraCalibration:
     bundle = best.state
     free = bundle.free
     inverted = inverse(best.matrix)
@@ -168,7 +193,7 @@ def _told(best: _Adjusted, views: Sequence[BoardView], used: Sequence[NDArray[np
     if share > FOCAL_SHARE or not low < camera.focal_px.min() <= camera.focal_px.max() < high:
         raise unobservable(bundle.poses, share)
     blocks = [slice(len(free) + 6 * number, len(free) + 6 * number + 6) for number in range(len(views))]
-    residuals = bundle.residuals(Seen(view.points_mm, view.pixels) for view in views)
+    residuals = bundle.residuals(seen)
     squares = [(rows[keep] ** 2).sum(axis=1) for rows, keep in zip(residuals, used, strict=True)]
     return CameraCalibration(
         camera,

@@ -13,9 +13,10 @@ from glisson.core.status import Status
 from glisson.core.transform import RigidTransform
 from glisson.intraoperative.cameras.boards import BoardView
 
-FOCAL_SHARE = 0.02
+FOCAL_SHARE = 0.05
 """Standard deviation of the focal length, as a share of it, above which it counts as unobservable."""
 
+_FOCAL_NOTE = 0.005
 _TILT_DEG = 10.0
 _COVERED = 0.5
 _PATIENCE = 2.5
@@ -59,6 +60,10 @@ def notes_on_views(
             f"The boards cover {100.0 * covered:.0f} % of the image: outside of them distortion is a guess, "
             "so hold the board into the corners too."
         )
+    assert camera.covariance is not None  # a calibration has one
+    share = float((np.sqrt(np.diag(camera.covariance)[:2]) / camera.focal_px).max())
+    if share > _FOCAL_NOTE:
+        notes.append(f"The focal length is known to {100.0 * share:.1f} % only (one standard deviation).")
     if len(poses) < 6:
         notes.append(f"{len(poses)} views are few; 10 or more tell more surely.")
     for view, keep in zip(views, used, strict=True):

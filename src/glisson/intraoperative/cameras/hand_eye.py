@@ -1,7 +1,7 @@
 """Hand–eye calibration: where the camera is in the frame of the marker that the tracker sees on it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -14,10 +14,15 @@ from glisson.core.transform import RigidTransform
 from glisson.intraoperative.cameras.adjustment import moved_pose, with_covariance
 from glisson.intraoperative.cameras.board_pose import BoardPose, board_pose
 from glisson.intraoperative.cameras.hand_eye_closed_form import hand_eye_closed_form
-from glisson.intraoperative.cameras.hand_eye_equations import HandEyeView, linearised, tracked
+from glisson.intraoperative.cameras.hand_eye_equations import (
+    HandEyeView,
+    camera_steps,
+    linearised,
+    moved_camera,
+    tracked,
+)
 from glisson.intraoperative.cameras.projection import project
 from glisson.intraoperative.cameras.turning import turning
-from glisson.intraoperative.cameras.variance_components import Blocks
 
 _TURNED_DEG = 3.0
 _PATIENCE = 5.0
@@ -28,8 +33,9 @@ class HandEye:
     """How camera and board are fixed to what is tracked.
 
     Args:
-        camera_from_marker: with covariance, that of the camera's intrinsics included.
+        camera_from_marker: with covariance.
         base_from_board: "base" is the board's marker, or the room where it has none; with covariance.
+        camera: as the tracked poses correct it within its covariance; it belongs to these poses.
         rms_px: root mean square distance between board points found and reprojected through the tracker.
         rms_mm: root mean square distance between the board's middle as tracked and as seen.
         rms_deg: the same of its turn.
@@ -44,6 +50,7 @@ class HandEye:
 
     camera_from_marker: RigidTransform
     base_from_board: RigidTransform
+    camera: Camera
     rms_px: float
     rms_mm: float
     rms_deg: float
@@ -60,8 +67,10 @@ def calibrate_hand_eye(camera: Camera, views: Sequence[HandEyeView]) -> HandEye:
     """Hand–eye and robot–world calibration together: A = X B Z, with A and B of each view, X and Z sought.
 
     The closed form of `hand_eye_closed_form` is refined: what the views say is weighted by the information of their
-    pixels on the board's pose and by the errors of the tracker in angle and place, whose sizes the residuals tell. To
-    first order this is a bundle adjustment of reprojected points with the true tracked poses among the unknowns.
+    pixels on the board's pose and by the errors of the tracker in angle and place, whose sizes the residuals tell. The
+    camera may move within its covariance. To first order this is a bundle adjustment of reprojected points with the
+    true tracked poses and the intrinsics among the unknowns. (Least squares of pixels alone, as if the tracker were
+    exact, put the camera ten times farther off in simulations.)
 
     Raises:
         BadInput: fewer than three views, or a second marker in some only.
@@ -69,17 +78,20 @@ def calibrate_hand_eye(camera: Camera, views: Sequence[HandEyeView]) -> HandEye:
     """
     _check(views)
     boards = [board_pose(camera, view.board) for view in views]
-    found = hand_eye_closed_form([board.camera_from_board for board in boards], [tracked(view) for view in views])
+    poses = hand_eye_closed_form([board.camera_from_board for board in boards], [tracked(view) for view in views])
     sigma_px = _pixel_sigma(boards)
-    sizes = np.array([3e-3, 0.3])
+    sizes, steps = np.array([3e-3, 0.3]), camera_steps(camera)
     for _ in range(5):
-        blocks = linearised(found, boards, views, sigma_px)
+        blocks = linearised(poses, boards, views, sigma_px, steps)
         sizes = blocks.sizes(sizes)
         step, normal = blocks.solved(sizes)
-        found = (moved_pose(found[0], step[:6]), moved_pose(found[1], step[6:]))
-    covariance = blocks.covariance(normal) + _by_intrinsics(camera, boards, blocks, sizes, normal)
-    poses = with_covariance(found[0], covariance[:6, :6]), with_covariance(found[1], covariance[6:, 6:])
-    return _told(camera, views, boards, poses, (sigma_px, float(np.degrees(sizes[0])), float(sizes[1])))
+        poses = (moved_pose(poses[0], step[:6]), moved_pose(poses[1], step[6:12]))
+    covariance = blocks.covariance(normal)
+    corrected = moved_camera(camera, steps @ step[12:])
+    if camera.covariance is not None:
+        corrected = replace(corrected, covariance=steps @ covariance[12:, 12:] @ steps.T)
+    poses = with_covariance(poses[0], covariance[:6, :6]), with_covariance(poses[1], covariance[6:12, 6:12])
+    return _told(corrected, views, poses, (sigma_px, float(np.degrees(sizes[0])), float(sizes[1])))
 
 
 def _check(views: Sequence[HandEyeView]) -> None:
@@ -102,38 +114,25 @@ def _pixel_sigma(boards: Sequence[BoardPose]) -> float:
     return float(np.sqrt(squares / sum(board.residuals_px.size - 6 for board in boards)))
 
 
-def _by_intrinsics(
-    camera: Camera, boards: Sequence[BoardPose], blocks: Blocks, sizes: FloatArray, normal: FloatArray
-) -> FloatArray:
-    """What the camera's own covariance adds to that of both poses (12, 12): it shifts all views together."""
-    if camera.covariance is None:
-        return np.zeros((12, 12))
-    shifted = np.stack([board.by_camera for board in boards])
-    gained = np.einsum("bmp,bmk,bkc->pc", blocks.jacobian, blocks.weights(sizes), shifted)
-    by_camera = np.linalg.solve(normal, gained)
-    result: FloatArray = by_camera @ camera.covariance @ by_camera.T
-    return result
-
-
 def _told(
     camera: Camera,
     views: Sequence[HandEyeView],
-    boards: Sequence[BoardPose],
     poses: tuple[RigidTransform, RigidTransform],
     sigmas: tuple[float, float, float],
 ) -> HandEye:
     residuals, apart_mm, apart_deg = [], [], []
-    for view, board in zip(views, boards, strict=True):
+    for view in views:
         through = poses[0].after(tracked(view)).after(poses[1])
         residuals.append(view.board.pixels - project(camera, through, view.board.points_mm))
         middle = view.board.points_mm.mean(axis=0)
-        seen = board.camera_from_board
+        seen = board_pose(camera, view.board).camera_from_board
         apart_mm.append(float(np.linalg.norm(seen.apply(middle) - through.apply(middle))))
         apart_deg.append(float(np.degrees(Rotation.from_matrix(seen.rotation @ through.rotation.T).magnitude())))
     squares = [(rows**2).sum(axis=1) for rows in residuals]
     turned = turning([tracked(view).rotation.T for view in views])
     return HandEye(
         *poses,
+        camera,
         float(np.sqrt(np.concatenate(squares).mean())),
         float(np.sqrt(np.mean(np.square(apart_mm)))),
         float(np.sqrt(np.mean(np.square(apart_deg)))),

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from glisson.core.arrays import FloatArray
+from glisson.core.camera import Camera
 from glisson.core.transform import RigidTransform, cross_matrix
 from glisson.intraoperative.cameras.adjustment import with_covariance
 from glisson.intraoperative.cameras.board_pose import BoardPose
@@ -49,14 +50,16 @@ def linearised(
     boards: Sequence[BoardPose],
     views: Sequence[HandEyeView],
     sigma_px: float,
+    camera_steps: FloatArray,
 ) -> Blocks:
-    """How far each board, as seen, is from where it is tracked, by steps of X (6) and Z (6).
+    """How far each board, as seen, is from where it is tracked, by steps of X (6), Z (6) and the camera (k).
 
     Args:
         poses: `camera_from_marker` X and `base_from_board` Z.
         boards: the board as seen in each view.
         views: the views.
         sigma_px: standard deviation of a coordinate of a found point.
+        camera_steps: steps (9, k) of the camera's intrinsics, each of one standard deviation.
 
     Returns:
         Blocks of turn and shift (n, 6); the parts are the tracker's errors in angle (1 rad) and in place (1 mm).
@@ -72,9 +75,29 @@ def linearised(
         arm = through[0].translation_mm - camera_from_marker.translation_mm
         by_first = np.block([[np.eye(3), np.zeros((3, 3))], [-cross_matrix(arm), np.eye(3)]])
         by_last = np.kron(np.eye(2), camera_from_marker.rotation @ tracked(view).rotation)
-        jacobians.append(np.hstack([by_first, by_last]))
+        jacobians.append(np.hstack([by_first, by_last, -board.by_camera @ camera_steps]))
     known = sigma_px**2 * np.stack([board.cofactor for board in boards])
-    return Blocks(np.stack(residuals), np.stack(jacobians), known, np.array(parts).transpose(1, 0, 2, 3))
+    prior = np.diag(np.concatenate([np.zeros(12), np.ones(camera_steps.shape[1])]))
+    return Blocks(np.stack(residuals), np.stack(jacobians), known, np.array(parts).transpose(1, 0, 2, 3), prior)
+
+
+def camera_steps(camera: Camera) -> FloatArray:
+    """Independent steps (9, k) of a camera's intrinsics of one standard deviation each; none where it is exact."""
+    if camera.covariance is None:
+        return np.zeros((9, 0))
+    scale = np.sqrt(np.maximum(np.diag(camera.covariance), 1e-300))
+    values, vectors = np.linalg.eigh(camera.covariance / np.outer(scale, scale))
+    kept = values > 1e-9
+    steps: FloatArray = scale[:, None] * vectors[:, kept] * np.sqrt(values[kept])
+    return steps
+
+
+def moved_camera(camera: Camera, step: FloatArray) -> Camera:
+    """A camera with its intrinsics moved by a step (9,), without covariance."""
+    return Camera(
+        camera.width, camera.height, camera.focal_px + step[:2], camera.centre_px + step[2:4],
+        camera.distortion + step[4:],
+    )  # fmt: skip
 
 
 def _step(start: RigidTransform, end: RigidTransform) -> FloatArray:

@@ -19,12 +19,14 @@ class Blocks:
         jacobian: (n, m, p).
         known: (n, m, m).
         parts: (k, n, m, m).
+        prior: what is known of the unknowns beforehand, an information matrix (p, p); they are about 0.
     """
 
     residuals: FloatArray
     jacobian: FloatArray
     known: FloatArray
     parts: FloatArray
+    prior: FloatArray
 
     def weights(self, sizes: FloatArray) -> FloatArray:
         """The inverse covariance (n, m, m) of each block for sizes (k,)."""
@@ -33,7 +35,7 @@ class Blocks:
     def solved(self, sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The unknowns x (p,) with the least weighted squares, and the normal matrix (p, p)."""
         weighted = self.weights(sizes) @ self.jacobian
-        normal = np.einsum("bmp,bmq->pq", self.jacobian, weighted)
+        normal = np.einsum("bmp,bmq->pq", self.jacobian, weighted) + self.prior
         return np.linalg.solve(normal, np.einsum("bmp,bm->p", weighted, self.residuals)), normal
 
     def covariance(self, normal: FloatArray) -> FloatArray:
@@ -41,7 +43,7 @@ class Blocks:
 
         With ν observations to spare the unknowns follow Student's distribution, whose variance is ν / (ν − 2) larger.
         """
-        spare = self.residuals.size - normal.shape[0]
+        spare = max(self.residuals.size - normal.shape[0] + np.linalg.matrix_rank(self.prior), 3)
         result: FloatArray = np.linalg.inv(normal) * (spare / (spare - 2.0))
         return result
 
@@ -68,5 +70,6 @@ class Blocks:
         unknowns, normal = self.solved(sizes)
         rest = self.residuals - self.jacobian @ unknowns
         squares = np.einsum("bi,bi->", rest, np.linalg.solve(covariance, rest[:, :, None])[:, :, 0])
+        squares += unknowns @ self.prior @ unknowns
         logarithms = np.linalg.slogdet(covariance)[1].sum() + np.linalg.slogdet(normal)[1]
         return float(logarithms + squares)
