@@ -74,7 +74,7 @@ def localise_corners(inputs: Mapping[str, Any], folder: Path) -> Outcome:
         visible = len(cross) // 12
         cross = _misread(cross, len(view.layout), rng)
         milliseconds = None
-        found = Localisation(Status.UNOBSERVABLE, "Fewer than two crosses are seen.")
+        found = Localisation(Status.UNOBSERVABLE, "No two crosses agree on a pose.")
         if visible >= 2:
             seen = corners_at(view.given_camera, view.given_layout, cross, corner, pixels, _CORNER_PX)
             if number == inputs["first"]:
