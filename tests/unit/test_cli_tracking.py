@@ -9,12 +9,14 @@ import pytest
 
 from glisson.core.camera import Camera
 from glisson.core.tracks import Tracks
+from glisson.io.camera_files import write_camera
 from glisson.io.track_files import read_tracks, write_tracks
 from glisson.io.video import write_video
 from glisson.phantom.breathing.exposing import Shutter
 from glisson.phantom.breathing.motion import Irregularity, draw_breaths
 from glisson.phantom.breathing.tissue import draw_tissue
 from glisson.phantom.breathing.view import BreathingVideo
+from glisson.phantom.optics import ray_slopes
 
 Glisson = Callable[..., tuple[int, dict[str, Any]]]
 CAMERA = Camera(480, 270, [320.0, 320.0], [241.0, 134.0], [-0.22, 0.06, 0.0, 0.0, 0.0])
@@ -55,6 +57,21 @@ def test_a_video_is_followed_and_its_breaths_are_told(
     assert said["displacement"] == pytest.approx(20.0, rel=0.2)
     assert 0 < len(said["gate_frames"]) < 100
     assert Path(said["picture"]).read_bytes().startswith(b"\x89PNG")
+
+
+def test_tracks_are_in_mm_by_a_camera(recording: tuple[Path, BreathingVideo], glisson: Glisson, tmp_path: Path) -> None:
+    path, video = recording
+    write_camera(tmp_path / "camera.toml", CAMERA)
+    u, v = video.marks_px()[0, 4]
+    distance = video.tissue.middle_mm[2]
+    words = ["--at", f"{u:.2f},{v:.2f}", "--out", tmp_path, "--camera", tmp_path / "camera.toml"]
+    code, said = glisson("track", path, *words, "--distance-mm", f"{distance:.3f}")
+    assert (code, said["unit"]) == (0, "mm"), said
+    place = read_tracks(said["file"]).places[0, 0]
+    assert place == pytest.approx(distance * ray_slopes(CAMERA, [[u, v]])[0], abs=0.01)
+    code, said = glisson("track", path, *words)
+    assert code == 2
+    assert "belong together" in said["message"]
 
 
 def test_markers_may_be_given(recording: tuple[Path, BreathingVideo], glisson: Glisson, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from glisson.core.registry import make_technique
 from glisson.core.tracks import PointState, Tracks
 from glisson.core.transform import RigidTransform
 from glisson.intraoperative.tracks.markers import corners, dark_spots
-from glisson.intraoperative.tracks.millimetres import on_plane, scaled
+from glisson.intraoperative.tracks.millimetres import at_distance, on_plane, scaled
 from glisson.io.track_files import read_tracks, write_tracks
 from glisson.phantom.breathing.exposing import Shutter
 from glisson.phantom.breathing.motion import Irregularity, draw_breaths
@@ -187,6 +187,23 @@ def test_markers_on_a_plane_from_a_scope_that_moves():
     assert 0.8 < np.mean(squares) < 3.8
     with pytest.raises(BadInput, match="2 poses for 3 frames"):
         on_plane(tracks, CAMERA, poses[:2], origin, normal)
+
+
+def test_tracks_at_a_distance_from_a_calibrated_camera():
+    """Against points of a plane across the axis, projected by OpenCV."""
+    rng = np.random.default_rng(6)
+    points = np.concatenate([rng.uniform(-40.0, 40.0, (3, 4, 2)), np.full((3, 4, 1), 90.0)], axis=2)
+    seen, _ = cv2.projectPoints(points.reshape(-1, 3), np.zeros(3), np.zeros(3), CAMERA.matrix, CAMERA.distortion)
+    spread = np.broadcast_to(0.25 * np.eye(2), (3, 4, 2, 2))
+    tracks = Tracks(np.arange(3.0), seen.reshape(3, 4, 2), spread, np.zeros((3, 4)))
+    found = at_distance(tracks, CAMERA, 90.0)
+    assert found.unit == "mm"
+    np.testing.assert_allclose(found.places, points[:, :, :2], atol=1e-6)
+    # Barrel distortion makes pixels larger outwards than the 90 / 640 mm that they have on the axis.
+    sigma = np.sqrt(np.linalg.det(found.covariance)) / 0.25
+    assert (sigma > (90.0 / 640.0) ** 2).all()
+    with pytest.raises(BadInput, match="distance must be positive"):
+        at_distance(tracks, CAMERA, 0.0)
 
 
 def test_tracks_must_make_sense():

@@ -11,7 +11,7 @@ from glisson.cli.command import Command
 from glisson.cli.console import Answer
 from glisson.cli.options import positive_from_text
 from glisson.cli.progress import StageLines
-from glisson.cli.track import add_marker_options, followed
+from glisson.cli.track import add_marker_options, followed, unit_of
 from glisson.core.errors import BadInput
 from glisson.core.status import Status
 from glisson.core.tracks import Tracks
@@ -20,7 +20,6 @@ from glisson.intraoperative.breathing.cycles import Cycles, find_cycles
 from glisson.intraoperative.breathing.displacement import Displacement, displacement_at
 from glisson.intraoperative.breathing.motion_model import BreathingModel, fit_breathing
 from glisson.intraoperative.breathing.plateau import find_plateau
-from glisson.intraoperative.tracks.millimetres import scaled
 from glisson.io.atomic import atomic_path
 from glisson.io.track_files import read_tracks
 from glisson.navigation.figures.picture import Picture
@@ -60,21 +59,21 @@ def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
         )
     if not rates and len(arguments.recording) > 1:
         raise BadInput("Several recordings are compared by their rates; give --rate-hz for each.")
+    in_unit = unit_of(arguments)
     recordings = [_tracks(path, arguments, lines) for path in arguments.recording]
     notes = [note for _, found in recordings for note in found]
     out = Path(arguments.out) if arguments.out else Path(arguments.recording[0]).parent
-    tracks = [made for made, _ in recordings]
+    tracks = [in_unit(made) for made, _ in recordings]
     return _by_rate(tracks, rates, arguments, notes, out) if rates else _by_breath(tracks[0], arguments, notes, out)
 
 
 def _tracks(path: str, arguments: argparse.Namespace, lines: StageLines) -> tuple[Tracks, tuple[str, ...]]:
-    scale = None if arguments.mm_per_px is None else positive_from_text(arguments.mm_per_px, "--mm-per-px")
     if Path(path).suffix == ".csv":
         tracks, notes = read_tracks(path), tuple[str, ...]()
     else:
         tracked = followed(path, arguments, lines)
         tracks, notes = tracked.tracks, tracked.notes
-    return (tracks if scale is None else scaled(tracks, scale)), notes
+    return tracks, notes
 
 
 def _by_breath(tracks: Tracks, arguments: argparse.Namespace, notes: Sequence[str], out: Path) -> Answer:

@@ -1,6 +1,7 @@
 """`glisson track`: markers followed through a laparoscope's video."""
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +13,12 @@ from glisson.cli.options import pixel_from_text, positive_from_text
 from glisson.cli.progress import StageLines
 from glisson.core.errors import BadInput
 from glisson.core.status import Status
-from glisson.core.tracks import PointState
+from glisson.core.tracks import PointState, Tracks
 from glisson.framework.track_figures import draw_tracks
 from glisson.framework.tracking import FINDERS, TECHNIQUE, TrackedVideo, track_video
-from glisson.intraoperative.tracks.millimetres import scaled
+from glisson.intraoperative.tracks.millimetres import at_distance, scaled
 from glisson.io.atomic import atomic_path
+from glisson.io.camera_files import read_camera
 from glisson.io.track_files import write_tracks
 from glisson.studies.page import png
 
@@ -42,6 +44,23 @@ def add_marker_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--count", metavar="N", help=f"how many of these (default {COUNT})")
     parser.add_argument("--technique", metavar="NAME", default=TECHNIQUE, help=f"see glisson techniques; {TECHNIQUE}")
     parser.add_argument("--mm-per-px", metavar="MM", help="size of a pixel at the tissue; tracks are in mm then")
+    parser.add_argument("--camera", metavar="FILE", help="the scope's camera.toml: mm without distortion")
+    parser.add_argument("--distance-mm", metavar="MM", help="how far the tissue is before that camera")
+
+
+def unit_of(arguments: argparse.Namespace) -> Callable[[Tracks], Tracks]:
+    """What brings tracks to mm where the options say how; else leaves them as they are."""
+    if (arguments.camera is None) != (arguments.distance_mm is None):
+        raise BadInput("--camera and --distance-mm belong together.")
+    if arguments.camera is not None and arguments.mm_per_px is not None:
+        raise BadInput("Give --mm-per-px, or --camera and --distance-mm, not both.")
+    if arguments.camera is not None:
+        camera, distance = read_camera(arguments.camera), positive_from_text(arguments.distance_mm, "--distance-mm")
+        return lambda tracks: at_distance(tracks, camera, distance)
+    if arguments.mm_per_px is not None:
+        scale = positive_from_text(arguments.mm_per_px, "--mm-per-px")
+        return lambda tracks: scaled(tracks, scale)
+    return lambda tracks: tracks
 
 
 def followed(video: str, arguments: argparse.Namespace, lines: StageLines) -> TrackedVideo:
@@ -63,9 +82,9 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
-    scale = None if arguments.mm_per_px is None else positive_from_text(arguments.mm_per_px, "--mm-per-px")
+    in_unit = unit_of(arguments)
     tracked = followed(arguments.video, arguments, lines)
-    tracks = tracked.tracks if scale is None else scaled(tracked.tracks, scale)
+    tracks = in_unit(tracked.tracks)
     out = Path(arguments.out) if arguments.out else Path(arguments.video).parent
     write_tracks(out / TRACKS, tracks)
     with atomic_path(out / PICTURE) as temporary:
@@ -107,6 +126,7 @@ COMMAND = Command(
     "track",
     "  glisson track liver.mp4\n"
     "  glisson track liver.mp4 --at 312,200 --at 460,188 --mm-per-px 0.14 --out tracks --json\n"
+    "  glisson track liver.mp4 --camera camera.toml --distance-mm 90\n"
     "  glisson track liver.mp4 --find corners --count 40",
     _add_arguments,
     _run,

@@ -29,6 +29,19 @@ def scaled(tracks: Tracks, mm_per_px: float) -> Tracks:
     return replace(tracks, places=mm_per_px * tracks.places, covariance=mm_per_px**2 * tracks.covariance, unit="mm")
 
 
+def at_distance(tracks: Tracks, camera: Camera, distance_mm: float) -> Tracks:
+    """Tracks in mm across a calibrated camera's axis, without its distortion, of tissue at a distance along the axis.
+
+    Raises:
+        BadInput: the tracks are not in px, or the distance is not positive.
+    """
+    if not (np.isfinite(distance_mm) and distance_mm > 0.0):
+        raise BadInput(f"The tissue's distance must be positive, not {distance_mm} mm.")
+    still = RigidTransform("room", "camera", np.eye(3), np.zeros(3))
+    points, covariance = on_plane(tracks, camera, [still], [0.0, 0.0, distance_mm], [0.0, 0.0, 1.0])
+    return replace(tracks, places=points[:, :, :2], covariance=covariance[:, :, :2, :2], unit="mm")
+
+
 def on_plane(
     tracks: Tracks,
     camera: Camera,

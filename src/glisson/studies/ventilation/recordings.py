@@ -4,12 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from glisson.core.arrays import FloatArray
 from glisson.core.camera import Camera
 from glisson.phantom.breathing.exposing import Shutter
 from glisson.phantom.breathing.motion import Breaths, Irregularity, Motion, Ventilator, draw_breaths
 from glisson.phantom.breathing.occluders import draw_glare, draw_passing
 from glisson.phantom.breathing.tissue import Tissue, draw_tissue
 from glisson.phantom.breathing.view import BreathingVideo
+from glisson.phantom.optics import ray_slopes
 
 CAMERA = Camera(
     960, 540, np.array([640.0, 640.0]), np.array([482.0, 268.0]), np.array([-0.22, 0.06, 5e-4, -4e-4, 0.0])
@@ -130,9 +132,15 @@ def breaths_of(video: BreathingVideo) -> Breaths:
     return video.motion
 
 
-def mm_per_px(video: BreathingVideo) -> float:
-    """Size of a pixel where the middle of the tissue is at full exhalation."""
-    return float(video.tissue.middle_mm[2] / video.camera.focal_px[0])
+def distance_mm(video: BreathingVideo) -> float:
+    """How far along the camera's axis the middle of the tissue is at full exhalation."""
+    return float(video.tissue.middle_mm[2])
+
+
+def true_mm(video: BreathingVideo, places_px: FloatArray) -> FloatArray:
+    """Places (…, 2) px in mm across the camera's axis at that distance, without distortion."""
+    slopes = ray_slopes(video.camera, places_px.reshape(-1, 2))
+    return np.asarray(distance_mm(video) * slopes.reshape(places_px.shape))
 
 
 def _video(

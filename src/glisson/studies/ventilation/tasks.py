@@ -16,7 +16,7 @@ from glisson.intraoperative.breathing.cycles import find_cycles
 from glisson.intraoperative.breathing.displacement import Displacement, displacement_at
 from glisson.intraoperative.breathing.motion_model import fit_breathing
 from glisson.intraoperative.breathing.plateau import find_plateau
-from glisson.intraoperative.tracks.millimetres import scaled
+from glisson.intraoperative.tracks.millimetres import at_distance
 from glisson.io.video import write_video
 from glisson.phantom.breathing.view import BreathingVideo
 from glisson.studies.point import Outcome, Task
@@ -27,10 +27,11 @@ from glisson.studies.ventilation.recordings import (
     breaths_of,
     breaths_video,
     conventional_video,
+    distance_mm,
     draw_sweep,
-    mm_per_px,
     sweep_tissue,
     sweep_video,
+    true_mm,
 )
 
 _SOURCE = (
@@ -99,7 +100,7 @@ def tell_breaths(inputs: Mapping[str, Any], folder: Path) -> Outcome:
 def conventional(inputs: Mapping[str, Any], folder: Path) -> Outcome:
     """`displacement_mm` of a conventional ventilator, from a rendered video; arrays: `times`, `values` of a marker."""
     video = conventional_video(inputs["seed"], inputs["duration_s"], inputs["frames_per_s"])
-    tracks = scaled(_followed(video).tracks, mm_per_px(video))
+    tracks = _in_mm(video, _followed(video).tracks)
     model = fit_breathing(tracks, find_cycles(tracks))
     excursions = model.excursions()
     known = np.flatnonzero(np.isfinite(excursions))
@@ -123,7 +124,7 @@ def _swept(sweep: Sweep, seed: int, noise_px: float | None) -> tuple[dict[str, A
     for number, rate in enumerate(RATES_HZ):
         video = sweep_video(sweep, tissue, number, seed, noise_px is None)
         tracks, _ = _tracks_of(video, noise_px, sweep.repeats, seed + number)
-        tracks = scaled(tracks, mm_per_px(video))
+        tracks = _in_mm(video, tracks)
         found.append(displacement_at(tracks, float(rate), sweep.told_exposure_s))
         if rate in SHOWN_HZ:
             marker = int(np.argmax(tracks.seen.mean(axis=0)))
@@ -153,15 +154,14 @@ def _measured(found: Displacement) -> dict[str, Any]:
 def _breaths_row(
     video: BreathingVideo, tracks: Tracks, truth: FloatArray
 ) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-    scale = mm_per_px(video)
-    tracks = scaled(tracks, scale)
+    tracks = _in_mm(video, tracks)
     cycles = find_cycles(tracks)
     model = fit_breathing(tracks, cycles)
     inside = np.isfinite(cycles.phase)
     apart = cycles.phase[inside] - breaths_of(video).phase(video.times_s)[inside]
     phase = np.abs((apart + 0.5) % 1.0 - 0.5)
     predicted = model.drift(tracks.times_s) + model.breathing(tracks.times_s)
-    off = np.linalg.norm(predicted - scale * truth, axis=2)[inside]
+    off = np.linalg.norm(predicted - true_mm(video, truth), axis=2)[inside]
     known = np.isfinite(off).all(axis=0)
     bins = (BINS * (cycles.phase[inside] % 1.0)).astype(int)
     by_phase = [float(np.sqrt((off[bins == n][:, known] ** 2).mean())) for n in range(BINS) if (bins == n).any()]
@@ -189,6 +189,10 @@ def _tracks_of(video: BreathingVideo, noise_px: float | None, repeats: int, seed
     times = np.arange(len(places)) / (repeats * video.shutter.frames_per_s)
     covariance = np.broadcast_to(noise_px**2 * np.eye(2), (*places.shape, 2))
     return Tracks(times, places, covariance, states), np.repeat(truth, repeats, axis=0)
+
+
+def _in_mm(video: BreathingVideo, tracks: Tracks) -> Tracks:
+    return at_distance(tracks, video.camera, distance_mm(video))
 
 
 def _followed(video: BreathingVideo, repeats: int = 1) -> TrackedVideo:
