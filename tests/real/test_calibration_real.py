@@ -159,9 +159,9 @@ def test_laparoscope_and_hand_eye_beside_upstream(laparoscope, capfd):
     with capfd.disabled():
         print(
             f"\nlaparoscope: printed upstream {printed_px:.2f} px, {printed_mm:.2f} mm; its parameters "
-            f"{their_px:.2f} px, {their_mm:.2f} mm; our hand-eye for its cameras {px:.2f} px, {mm:.2f} mm (least for any "
-            f"pose {rms(np.concatenate(floor)):.2f} mm); our cameras and hand-eye {own_px:.2f} px, {own_mm:.2f} mm, "
-            f"board's middle {own['left'].rms_mm:.2f} and {own['right'].rms_mm:.2f} mm"
+            f"{their_px:.2f} px, {their_mm:.2f} mm; our hand-eye for its cameras {px:.2f} px, {mm:.2f} mm (least for "
+            f"any pose {rms(np.concatenate(floor)):.2f} mm); our cameras and hand-eye {own_px:.2f} px, "
+            f"{own_mm:.2f} mm, board's middle {own['left'].rms_mm:.2f} and {own['right'].rms_mm:.2f} mm"
         )
     assert px < min(their_px, printed_px)
     assert mm < their_mm

@@ -15,7 +15,7 @@ class Blocks:
     The error of a block has the covariance known + size₁² parts₁ + size₂² parts₂ …
 
     Args:
-        residuals: (n, m).
+        residuals: (n, m), small: where they are not, likelihoods are differences of large numbers.
         jacobian: (n, m, p).
         known: (n, m, m).
         parts: (k, n, m, m).
@@ -37,7 +37,7 @@ class Blocks:
         weighted = self.weights(sizes) @ self.jacobian
         normal = np.tensordot(self.jacobian, weighted, axes=((0, 1), (0, 1))) + self.prior
         right = np.tensordot(weighted, self.residuals, axes=((0, 1), (0, 1)))
-        return np.linalg.solve(normal, right), normal
+        return np.asarray(np.linalg.solve(normal, right), dtype=np.float64), normal
 
     def covariance(self, normal: FloatArray) -> FloatArray:
         """The covariance (p, p) of the unknowns for sizes that are themselves estimates.
