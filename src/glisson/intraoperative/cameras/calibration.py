@@ -26,6 +26,9 @@ NAMES = ("k1", "k2", "p1", "p2", "k3")
 _OUTLYING = 5.0
 """Standard deviations from which a point was not the board's: one in 250,000 is as far by chance."""
 
+_LEAST_SIGMA_PX = 0.1
+"""No point is left out for less than half a pixel."""
+
 _FOCAL_LENGTHS = (0.2, 20.0)
 """Focal lengths of any camera, as a share of the image's width: 136° to 3° across."""
 
@@ -149,7 +152,7 @@ def _robust(bundle: Bundle, seen: Sequence[Seen]) -> Bundle:
 
 def _sigma(lengths: Sequence[FloatArray]) -> float:
     """Standard deviation of a coordinate from the lengths of residuals, by a median that outliers cannot spoil."""
-    return max(float(np.median(np.concatenate(lengths))) / _MEDIAN_NORM, 1e-3)
+    return max(float(np.median(np.concatenate(lengths))) / _MEDIAN_NORM, _LEAST_SIGMA_PX)
 
 
 def _within(residuals: Sequence[FloatArray]) -> list[NDArray[np.bool_]]:

@@ -26,6 +26,8 @@ from glisson.intraoperative.cameras.turning import turning
 
 _TURNED_DEG = 3.0
 _PATIENCE = 5.0
+_STARTS = ((1e-3, 0.1, 1.0), (1e-5, 1e-3, 10.0), (1e-4, 0.05, 3.0))
+"""Errors of a tracker in rad and mm, and of a board in standard deviations of a pixel, to begin with."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +44,8 @@ class HandEye:
         rms_px_of_views: `rms_px` of each view.
         residuals_px: found minus reprojected (n, 2) of each view.
         sigma_px: standard deviation of a coordinate of a found point.
+        board_sigma_px: how far the points of a board err together, as the residuals show it: from blur, print or a
+            distortion that the camera lacks.
         tracker_sigma_deg: standard deviation of a tracked angle about each axis, as the residuals show it.
         tracker_sigma_mm: standard deviation of a tracked coordinate.
         turned_deg: root mean square angles between poses about the two main axes.
@@ -57,6 +61,7 @@ class HandEye:
     rms_px_of_views: tuple[float, ...]
     residuals_px: tuple[FloatArray, ...]
     sigma_px: float
+    board_sigma_px: float
     tracker_sigma_deg: float
     tracker_sigma_mm: float
     turned_deg: tuple[float, float]
@@ -67,7 +72,8 @@ def calibrate_hand_eye(camera: Camera, views: Sequence[HandEyeView]) -> HandEye:
     """Hand–eye and robot–world calibration together: A = X B Z, with A and B of each view, X and Z sought.
 
     The closed form of `hand_eye_closed_form` is refined: what the views say is weighted by the information of their
-    pixels on the board's pose and by the errors of the tracker in angle and place, whose sizes the residuals tell. The
+    pixels on the board's pose, by the errors of the tracker in angle and place, and by errors that all points of a
+    board share; the sizes of these three the residuals tell. The
     camera may move within its covariance. To first order this is a bundle adjustment of reprojected points with the
     true tracked poses and the intrinsics among the unknowns. (Least squares of pixels alone, as if the tracker were
     exact, put the camera ten times farther off in simulations.)
@@ -80,10 +86,12 @@ def calibrate_hand_eye(camera: Camera, views: Sequence[HandEyeView]) -> HandEye:
     boards = [board_pose(camera, view.board) for view in views]
     poses = hand_eye_closed_form([board.camera_from_board for board in boards], [tracked(view) for view in views])
     sigma_px = _pixel_sigma(boards)
-    sizes, steps = np.array([3e-3, 0.3]), camera_steps(camera)
-    for _ in range(5):
+    starts, steps = np.array(_STARTS) * [1.0, 1.0, sigma_px], camera_steps(camera)
+    for number in range(4):
         blocks = linearised(poses, boards, views, sigma_px, steps)
-        sizes = blocks.sizes(sizes)
+        if number < 2:  # later the sizes change no more
+            sizes = blocks.sizes(starts)
+            starts = sizes[None]
         step, normal = blocks.solved(sizes)
         poses = (moved_pose(poses[0], step[:6]), moved_pose(poses[1], step[6:12]))
     covariance = blocks.covariance(normal)
@@ -91,7 +99,8 @@ def calibrate_hand_eye(camera: Camera, views: Sequence[HandEyeView]) -> HandEye:
     if camera.covariance is not None:
         corrected = replace(corrected, covariance=steps @ covariance[12:, 12:] @ steps.T)
     poses = with_covariance(poses[0], covariance[:6, :6]), with_covariance(poses[1], covariance[6:12, 6:12])
-    return _told(corrected, views, poses, (sigma_px, float(np.degrees(sizes[0])), float(sizes[1])))
+    sigmas = sigma_px, float(sizes[2]), float(np.degrees(sizes[0])), float(sizes[1])
+    return _told(corrected, views, poses, sigmas)
 
 
 def _check(views: Sequence[HandEyeView]) -> None:
@@ -118,7 +127,7 @@ def _told(
     camera: Camera,
     views: Sequence[HandEyeView],
     poses: tuple[RigidTransform, RigidTransform],
-    sigmas: tuple[float, float, float],
+    sigmas: tuple[float, float, float, float],
 ) -> HandEye:
     residuals, apart_mm, apart_deg = [], [], []
     for view in views:

@@ -62,7 +62,8 @@ def linearised(
         camera_steps: steps (9, k) of the camera's intrinsics, each of one standard deviation.
 
     Returns:
-        Blocks of turn and shift (n, 6); the parts are the tracker's errors in angle (1 rad) and in place (1 mm).
+        Blocks of turn and shift (n, 6); the parts are the tracker's errors in angle (1 rad) and in place (1 mm), and an
+        error that the points of a board share, as if each were found to 1 px only.
     """
     camera_from_marker, base_from_board = (with_covariance(pose, np.zeros((6, 6))) for pose in poses)
     residuals, jacobians, parts = [], [], []
@@ -70,7 +71,7 @@ def linearised(
         through = [
             camera_from_marker.after(tracked(view, kind)).after(base_from_board) for kind in (_IN_ANGLE, _IN_PLACE)
         ]
-        parts.append([pose.covariance for pose in through])
+        parts.append([*(pose.covariance for pose in through), board.cofactor])
         residuals.append(_step(through[0], board.camera_from_board))
         arm = through[0].translation_mm - camera_from_marker.translation_mm
         by_first = np.block([[np.eye(3), np.zeros((3, 3))], [-cross_matrix(arm), np.eye(3)]])

@@ -113,9 +113,10 @@ def _weighted(
     for _ in range(3):
         arms = np.stack([cross_matrix(rotation @ found[:3]) for rotation in rotations])
         parts = np.stack([arms @ arms.transpose(0, 2, 1), np.broadcast_to(np.eye(3), arms.shape)])
-        blocks = Blocks(-shifts, jacobian, np.zeros(arms.shape), parts, np.zeros((6, 6)))
-        sizes = blocks.sizes(sizes)
-        found, normal = blocks.solved(sizes)
+        blocks = Blocks(-shifts - jacobian @ found, jacobian, np.zeros(arms.shape), parts, np.zeros((6, 6)))
+        sizes = blocks.sizes(sizes[None])
+        step, normal = blocks.solved(sizes)
+        found = found + step
     return found, blocks.covariance(normal), float(sizes[0]), float(sizes[1])
 
 

@@ -1,4 +1,4 @@
-"""Least squares where two kinds of error of unknown size meet, such as a tracker's in angle and in place."""
+"""Least squares where kinds of error of unknown size meet, such as a tracker's in angle and in place."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ class Blocks:
     The error of a block has the covariance known + size₁² parts₁ + size₂² parts₂ …
 
     Args:
-        residuals: (n, m).
+        residuals: (n, m), small: where they are not, likelihoods are differences of large numbers.
         jacobian: (n, m, p).
         known: (n, m, m).
         parts: (k, n, m, m).
@@ -35,8 +35,9 @@ class Blocks:
     def solved(self, sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The unknowns x (p,) with the least weighted squares, and the normal matrix (p, p)."""
         weighted = self.weights(sizes) @ self.jacobian
-        normal = np.einsum("bmp,bmq->pq", self.jacobian, weighted) + self.prior
-        return np.linalg.solve(normal, np.einsum("bmp,bm->p", weighted, self.residuals)), normal
+        normal = np.tensordot(self.jacobian, weighted, axes=((0, 1), (0, 1))) + self.prior
+        right = np.tensordot(weighted, self.residuals, axes=((0, 1), (0, 1)))
+        return np.asarray(np.linalg.solve(normal, right), dtype=np.float64), normal
 
     def covariance(self, normal: FloatArray) -> FloatArray:
         """The covariance (p, p) of the unknowns for sizes that are themselves estimates.
@@ -47,18 +48,23 @@ class Blocks:
         result: FloatArray = np.linalg.inv(normal) * (spare / (spare - 2.0))
         return result
 
-    def sizes(self, start: FloatArray) -> FloatArray:
+    def sizes(self, starts: FloatArray) -> FloatArray:
         """The sizes (k,) of greatest restricted likelihood (Patterson and Thompson 1971).
 
-        A size that the residuals do not show comes out at a thousandth of its start.
+        The likelihood may have several peaks: it is climbed from each of `starts` (m, k). A size that the residuals do
+        not show comes out at a thousandth of its start.
         """
-        found = minimize(
-            lambda logarithms: self._unlikeliness(start * np.exp(logarithms)),
-            np.zeros(len(start)),
-            method="L-BFGS-B",
-            bounds=[(np.log(1e-3), np.log(1e3))] * len(start),
-        )
-        result: FloatArray = start * np.exp(found.x)
+        climbed = [
+            minimize(
+                lambda logarithms, start=start: self._unlikeliness(start * np.exp(logarithms)),
+                np.zeros(len(start)),
+                method="L-BFGS-B",
+                bounds=[(np.log(1e-3), np.log(1e3))] * len(start),
+            )
+            for start in starts
+        ]
+        best = min(range(len(starts)), key=lambda number: float(climbed[number].fun))
+        result: FloatArray = starts[best] * np.exp(climbed[best].x)
         return result
 
     def _covariance(self, sizes: FloatArray) -> FloatArray:
@@ -66,10 +72,11 @@ class Blocks:
         return total
 
     def _unlikeliness(self, sizes: FloatArray) -> float:
-        covariance = self._covariance(sizes)
-        unknowns, normal = self.solved(sizes)
-        rest = self.residuals - self.jacobian @ unknowns
-        squares = np.einsum("bi,bi->", rest, np.linalg.solve(covariance, rest[:, :, None])[:, :, 0])
-        squares += unknowns @ self.prior @ unknowns
-        logarithms = np.linalg.slogdet(covariance)[1].sum() + np.linalg.slogdet(normal)[1]
+        weights = self.weights(sizes)
+        weighted = weights @ self.jacobian
+        normal = np.tensordot(self.jacobian, weighted, axes=((0, 1), (0, 1))) + self.prior
+        right = np.tensordot(weighted, self.residuals, axes=((0, 1), (0, 1)))
+        squares = np.einsum("bm,bmn,bn->", self.residuals, weights, self.residuals)
+        squares -= right @ np.linalg.solve(normal, right)
+        logarithms = np.linalg.slogdet(normal)[1] - np.linalg.slogdet(weights)[1].sum()
         return float(logarithms + squares)
