@@ -74,7 +74,8 @@ def hand_eye_answer(made: HandEye, boards: BoardImages, folder: Path, upside_dow
         f"camera       {_measured(pose.translation_mm, _sigma(pose)[3:])} mm (marker's origin in the camera's frame)",
         f"turn         known to {float(np.degrees(_sigma(pose)[:3].max())):.2f}°",
         f"residual     {made.rms_px:.2f} px, {made.rms_mm:.2f} mm, {made.rms_deg:.2f}° over {len(boards.views)} views",
-        f"tracker      {made.tracker_sigma_mm:.2f} mm, {made.tracker_sigma_deg:.3f}° as the residuals show it",
+        f"errors shown tracker {made.tracker_sigma_mm:.2f} mm and {made.tracker_sigma_deg:.3f}°, "
+        f"points {made.sigma_px:.2f} px each and {made.board_sigma_px:.2f} px together",
         f"written      {folder / HAND_EYE}, and beside it {BOARD}, {HAND_EYE_CAMERA} and {HAND_EYE_PICTURE}",
     ]
     return Answer(values, "\n".join(text + _look_at(notes)))
