@@ -36,7 +36,8 @@ class Finger:
 class WheelScene:
     """An instrument in a trocar, and what lies over its wheel and in the light.
 
-    `light` is the lamp's colour with the exposure, `slope` (2,) how the light changes over a wheel's radius.
+    `light` is the lamp's colour with the exposure, `slope` (2,) how the light changes over a wheel's radius. The image
+    has the light to the power 1 / `gamma`.
     """
 
     instrument: Instrument
@@ -44,6 +45,7 @@ class WheelScene:
     light: FloatArray
     slope: FloatArray
     sensor: Sensor
+    gamma: float = 1.0
     shaft_mm: float = 5.0
     fingers: tuple[Finger, ...] = ()
     blood: tuple[Spot, ...] = ()
@@ -81,6 +83,7 @@ def draw_scene(
         blood=tuple(_spot(rng, (0.05, 0.16), (0.6, 0.95)) for _ in range(int(rng.integers(1, 4)))) if blood else (),
         glare=(_spot(rng, (0.08, 0.25), (0.3, 1.2)),) if glare else (),
         seed=int(rng.integers(2**31)),
+        gamma=rng.uniform(1.0, 2.4),
     )
 
 

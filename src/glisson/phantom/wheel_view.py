@@ -1,7 +1,10 @@
 """The picture that a trocar's camera takes of an instrument's wheel, ray by ray along those of `optics`."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
 
 from glisson.core.arrays import FloatArray
 from glisson.core.camera import Camera
@@ -44,7 +47,9 @@ class WheelViews:
         fingers, blood, glare = _finger_rows(scene.fingers), _spot_rows(scene.blood), _spot_rows(scene.glare)
         wheel = (pose.rotation, pose.translation_mm, radius, 0.5 * scene.shaft_mm)
         add_light(light, self._slopes, self._box(pose, radius), *wheel, inks, lit, fingers, blood, glare)
-        return photographed(np.clip(light, 0.0, 1.0), scene.sensor, rng)
+        blur = scene.sensor.blur_px
+        blurred = np.clip(gaussian_filter(light, (blur, blur, 0.0), mode="nearest"), 0.0, 1.0)
+        return photographed(blurred ** (1.0 / scene.gamma), replace(scene.sensor, blur_px=0.0), rng)
 
     def _box(self, pose: RigidTransform, radius_mm: float) -> NDArray[np.int64]:
         """First row, row after the last, first column and column after the last about the wheel."""

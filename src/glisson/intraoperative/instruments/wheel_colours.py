@@ -14,11 +14,13 @@ _HUES = {"red": 0.0, "yellow": 53.0, "green": 138.0, "blue": 222.0}
 """Hues in degrees under white light."""
 _NEAR_HUE = 30.0
 _LEAST_SATURATION = 0.45
-_LEAST_VALUE = {"red": 0.62, "yellow": 0.62, "green": 0.4, "blue": 0.5}
+_LEAST_VALUE = {"red": 0.69, "yellow": 0.69, "green": 0.25, "blue": 0.35}
 """Shares of white's light. Blood is darker than red ink, and on yellow it would make red."""
+_GAMMA = 1.5
+"""Between none and what most cameras have: the higher it is, the paler are all colours in the image."""
 _DEGREES = 360
 _RADII = 9
-_READABLE = 0.3
+_READABLE = 0.2
 """So much of a sector must be of some colour."""
 _SURE = 0.7
 """And so much of that of the same one."""
@@ -75,7 +77,7 @@ def _labels(image: NDArray[np.uint8], camera: Camera, pose: RigidTransform, radi
     radii = np.linspace(RINGS.inner + margin, RINGS.outer - margin, _RADII)
     ink = _seen(image, camera, pose, radii * radius_mm)
     white = _white(_white_ring(image, camera, pose, radius_mm))
-    shares = ink / white
+    shares = (ink / white) ** _GAMMA
     value, least = shares.max(axis=2), shares.min(axis=2)
     chroma = np.maximum(value - least, 1e-6)
     red, green, blue = np.moveaxis(shares, 2, 0)

@@ -87,25 +87,37 @@ def _ellipse_of(outline: FloatArray, rng: np.random.Generator) -> tuple[FloatArr
         # Points of one stretch are on one arc more often than points from anywhere.
         begin, stretch = rng.integers(len(points)), max(12, int(len(points) * rng.uniform(0.1, 1.0)))
         chosen = (begin + rng.choice(stretch, 6, replace=False)) % len(points)
-        near = _near(points, cv2.fitEllipseDirect(points[chosen]))
+        near = _near(points, _fitted(points[chosen]))
         if near is not None and (best is None or near.sum() > best.sum()):
             best = near
     if best is None or best.sum() < 12:
         return None
-    middle, sizes, turn = cv2.fitEllipseDirect(points[best])
-    near = _near(points, (middle, sizes, turn))
-    if near is None:
+    ellipse = _fitted(points[best])
+    near = _near(points, ellipse)
+    if ellipse is None or near is None:
         return None
+    middle, sizes, turn = ellipse
     around = np.arctan2(*(points[near] - middle).T)
     if len(np.unique(np.floor(around * 18.0 / np.pi))) < _LEAST_ARC * 36:
         return None
     return np.array(middle), 0.5 * np.array(sizes), np.radians(turn)
 
 
-def _near(
-    points: NDArray[np.float32], ellipse: tuple[Sequence[float], Sequence[float], float]
-) -> NDArray[np.bool_] | None:
+_Ellipse = tuple[Sequence[float], Sequence[float], float]
+
+
+def _fitted(points: NDArray[np.float32]) -> _Ellipse | None:
+    """The ellipse nearest to points (n, 2), n ≥ 5; None where there is none, as on a line."""
+    try:
+        return cv2.fitEllipseDirect(points)
+    except cv2.error:
+        return None
+
+
+def _near(points: NDArray[np.float32], ellipse: _Ellipse | None) -> NDArray[np.bool_] | None:
     """Which points (n,) lie on an ellipse; None where it cannot be a wheel's."""
+    if ellipse is None:
+        return None
     middle, sizes, turn = np.array(ellipse[0]), 0.5 * np.array(ellipse[1]), np.radians(ellipse[2])
     if not np.isfinite([*middle, *sizes]).all() or sizes.min() < 0.5 * _LEAST_PX * _FLATTEST:
         return None

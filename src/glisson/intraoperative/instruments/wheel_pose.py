@@ -24,7 +24,7 @@ _STEPS = 12
 _WINDOWS = (0.12, 0.07, 0.05, 0.035)
 """How far edges are looked for after each step, in wheel radii."""
 _LEAST_NOISE_PX = 0.03
-_INDEPENDENT = 0.12
+_INDEPENDENT = 0.2
 """Of neighbouring edges this share tells something new: blur and the pixel grid shift them together."""
 _TUKEY = 4.0
 _GROWTH_PX = 0.3
