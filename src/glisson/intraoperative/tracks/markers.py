@@ -45,7 +45,8 @@ def dark_spots(image: NDArray[np.uint8], most: int, least: int = 1) -> FloatArra
     rows, columns = np.nonzero((best == around) & (best > _CONTRAST) & round_enough & _inner(best.shape))
     order = np.argsort(-best[rows, columns])[:most]
     contrasts = best[rows, columns][order]
-    order = order[contrasts > _OF_BEST * np.median(contrasts[: max(len(order) // 2, 1)])]
+    if len(order):
+        order = order[contrasts > _OF_BEST * np.median(contrasts[: (len(order) + 1) // 2])]
     _check_found(len(order), least, "dark spots")
     return np.column_stack([columns[order], rows[order]]).astype(np.float64)
 
