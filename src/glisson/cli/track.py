@@ -15,7 +15,7 @@ from glisson.core.errors import BadInput
 from glisson.core.status import Status
 from glisson.core.tracks import PointState, Tracks
 from glisson.framework.track_figures import draw_tracks
-from glisson.framework.tracking import FINDERS, TECHNIQUE, TrackedVideo, track_video
+from glisson.framework.tracking import FINDERS, MOST, TECHNIQUE, TrackedVideo, track_video
 from glisson.intraoperative.tracks.millimetres import at_distance, scaled
 from glisson.io.atomic import atomic_path
 from glisson.io.camera_files import read_camera
@@ -23,7 +23,6 @@ from glisson.io.track_files import write_tracks
 from glisson.studies.page import png
 
 TRACKS, PICTURE = "tracks.csv", "tracks.png"
-COUNT = 20
 
 _KEYS = (
     "status", "message", "frames", "seconds_of_video", "markers", "unit", "frames_per_s", "following_per_s", "notes",
@@ -41,7 +40,7 @@ def add_marker_options(parser: argparse.ArgumentParser) -> None:
         help="a marker's place in the first frame, px; may be repeated",
     )
     parser.add_argument("--find", choices=tuple(FINDERS), default="spots", help="what is looked for without --at")
-    parser.add_argument("--count", metavar="N", help=f"how many of these (default {COUNT})")
+    parser.add_argument("--count", metavar="N", help=f"how many of these (default: up to {MOST})")
     parser.add_argument("--technique", metavar="NAME", default=TECHNIQUE, help=f"see glisson techniques; {TECHNIQUE}")
     parser.add_argument("--mm-per-px", metavar="MM", help="size of a pixel at the tissue; tracks are in mm then")
     parser.add_argument("--camera", metavar="FILE", help="the scope's camera.toml: mm without distortion")
@@ -67,7 +66,7 @@ def followed(video: str, arguments: argparse.Namespace, lines: StageLines) -> Tr
     """The markers of a video by these options, in px."""
     if arguments.at and arguments.count:
         raise BadInput("--count is for markers that are looked for; give it without --at.")
-    count = round(positive_from_text(arguments.count or str(COUNT), "--count"))
+    count = None if arguments.count is None else max(round(positive_from_text(arguments.count, "--count")), 1)
     places = np.array(arguments.at) if arguments.at else None
     progress = lines.begun("track", f"{video} is a video")
     tracked = track_video(video, places, arguments.find, count, arguments.technique, progress)

@@ -19,6 +19,7 @@ from glisson.intraoperative.tracks.markers import corners, dark_spots
 from glisson.io.video import Frame, open_video
 
 TECHNIQUE = "lucas-kanade"
+MOST = 20
 FINDERS = {"spots": dark_spots, "corners": corners}
 """How markers are found in the first frame."""
 
@@ -41,11 +42,11 @@ def track_video(
     path: str | Path,
     markers_px: FloatArray | None = None,
     find: str = "spots",
-    count: int = 20,
+    count: int | None = None,
     technique: str = TECHNIQUE,
     progress: Progress = silent,
 ) -> TrackedVideo:
-    """Follow markers: those given (m, 2) px in the first frame, or `count` that are found there.
+    """Follow markers: those given (m, 2) px in the first frame, or `count` that are found there (None: up to 20).
 
     Raises:
         BadInput: the video cannot be read, or a marker lies outside.
@@ -57,7 +58,7 @@ def track_video(
         first = next(frames, None)
         if first is None:
             raise StageFailed(f"{path} has no frame that can be read.", Status.UNOBSERVABLE)
-        markers = FINDERS[find](first.image, count) if markers_px is None else markers_px
+        markers = FINDERS[find](first.image, count or MOST, count or 1) if markers_px is None else markers_px
         timed = _Timed(chain([first], frames))
         started = perf_counter()
         tracks = tracker.track(timed.frames(), markers)

@@ -11,10 +11,14 @@ from glisson.core.errors import StageFailed
 from glisson.core.status import Status
 from glisson.core.tracks import Tracks
 from glisson.intraoperative.breathing.cycles import Cycles
+from glisson.intraoperative.breathing.signal import breathing_signal
 from glisson.intraoperative.breathing.waveform import periodic_basis
 
 _DEGREE = 3
 _BREATHS_A_PIECE = 4
+_LOST_SIGMAS = 20.0
+"""What the others say of a lost marker is so much less certain than what is seen of it."""
+
 _LEAST_SHARE = 2.0
 """A marker needs so many times as many frames in which it is seen as its model has numbers."""
 
@@ -86,25 +90,23 @@ def fit_breathing(tracks: Tracks, cycles: Cycles) -> BreathingModel:
     count = tracks.states.shape[1]
     solution = np.full((design.shape[1], count, 2), np.nan)
     covariance = np.full((count, 2, 2), np.nan)
-    for marker in range(count):
+    signal = breathing_signal(tracks)
+    for place, marker in enumerate(signal.markers):
         seen = tracks.seen[inside, marker]
-        if seen.sum() < _LEAST_SHARE * design.shape[1] or not _covered(phase[seen]):
+        if seen.sum() < _LEAST_SHARE * design.shape[1]:
             continue
-        places = tracks.places[inside][seen, marker]
-        sigma = np.sqrt(np.trace(tracks.covariance[inside][seen, marker], axis1=1, axis2=2) / 2.0)
-        weighed = design[seen] / sigma[:, None]
+        spread = np.sqrt(np.trace(tracks.covariance[inside, marker], axis1=1, axis2=2) / 2.0)
+        # Where it is lost the others say roughly where it is: it may be lost at one phase in every breath.
+        sigma = np.where(seen, spread, _LOST_SIGMAS * np.nanmedian(spread))
+        places = np.where(seen[:, None], tracks.places[inside, marker], signal.filled[inside, place])
         # The constant of the way is 0 by definition; the least of all solutions leaves it so.
+        weighed = design / sigma[:, None]
         solution[:, marker] = np.linalg.lstsq(weighed, places / sigma[:, None], rcond=1e-9)[0]
-        off = places - design[seen] @ solution[:, marker]
+        off = (places - design @ solution[:, marker])[seen]
         covariance[marker] = off.T @ off / max(len(off) - design.shape[1], 1)
     if np.isnan(covariance).all():
         raise StageFailed("No marker is seen in enough frames of whole breaths.", Status.UNOBSERVABLE)
     return BreathingModel(cycles, solution[: ways.shape[1]], solution[ways.shape[1] :], covariance)
-
-
-def _covered(phase: FloatArray) -> bool:
-    """Whether frames are there in each tenth of a breath."""
-    return len(np.unique((10.0 * (phase % 1.0)).astype(int))) == 10
 
 
 def _way_basis(phase: FloatArray) -> FloatArray:

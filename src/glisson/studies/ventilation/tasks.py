@@ -200,8 +200,7 @@ def _followed(video: BreathingVideo, repeats: int = 1) -> TrackedVideo:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "video.avi"
         write_video(path, _repeated(video, repeats), repeats * video.shutter.frames_per_s)
-        first = video.marks_visible()[0]
-        return track_video(path, count=int(first.sum()))
+        return track_video(path)
 
 
 def _repeated(video: BreathingVideo, repeats: int) -> Iterator[NDArray[np.uint8]]:
