@@ -196,8 +196,10 @@ def test_no_wheel_is_told(views):
     far = RigidTransform("trocar", "instrument", scene.trocar_from_instrument.rotation, [900.0, 0.0, 100.0])
     failure = refused(views.view(replace(scene, trocar_from_instrument=far)))
     assert failure.status is Status.UNOBSERVABLE
-    for empty in (np.zeros((960, 1280, 3), dtype=np.uint8), np.full((960, 1280, 3), 255, dtype=np.uint8)):
-        assert refused(empty).status is Status.UNOBSERVABLE
+    stripes = np.tile(np.repeat(np.array([20, 230], dtype=np.uint8), 40), 16)[None, :, None]
+    noise = np.random.default_rng(2).integers(0, 256, (960, 1280, 3))
+    for empty in (np.zeros((960, 1280, 3)), np.full((960, 1280, 3), 255), stripes * np.ones((960, 1, 3)), noise):
+        assert refused(np.ascontiguousarray(empty, dtype=np.uint8)).status is Status.UNOBSERVABLE
 
 
 def test_an_image_of_another_camera_is_told():
