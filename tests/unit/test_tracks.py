@@ -1,5 +1,7 @@
 """Markers followed: against images shifted by known amounts, and against the truth of a rendered video."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -203,6 +205,8 @@ def test_tracks_at_a_distance_from_a_calibrated_camera():
     # Barrel distortion makes pixels larger outwards than the 90 / 640 mm that they have on the axis.
     sigma = np.sqrt(np.linalg.det(found.covariance)) / 0.25
     assert (sigma > (90.0 / 640.0) ** 2).all()
+    lost = at_distance(replace(tracks, states=np.full((3, 4), PointState.LOST)), CAMERA, 90.0)
+    assert not lost.seen.any()
     with pytest.raises(BadInput, match="distance must be positive"):
         at_distance(tracks, CAMERA, 0.0)
 

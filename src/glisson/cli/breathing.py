@@ -134,7 +134,7 @@ def _by_rate(
 
 def _rate(found: Displacement) -> dict[str, Any]:
     return {
-        "rate_hz": found.rate_hz, "displacement": found.value, "sigma": found.sigma,
+        "rate_hz": found.rate_hz, "displacement": _number(found.value), "sigma": _number(found.sigma),
         "frames_per_s": found.frames_per_s, "status": found.status, "reasons": list(found.reasons),
     }  # fmt: skip
 

@@ -31,10 +31,11 @@ class Displacement:
 
     Args:
         rate_hz: strokes per second.
-        value: twice the amplitude of the fundamental, root mean square over the markers, in the unit of the tracks.
+        value: twice the amplitude of the fundamental, root mean square over the markers, in the unit of the tracks; NaN
+            where too few markers could be followed.
         sigma: its standard deviation by the scatter of the tracks.
         frames_per_s: different pictures per second.
-        status: unobservable where frame rate or shutter cannot resolve the rate.
+        status: unobservable where frame rate or shutter cannot resolve the rate, or no marker could be followed.
         reasons: of that, as sentences.
     """
 
@@ -53,11 +54,14 @@ def displacement_at(tracks: Tracks, rate_hz: float, exposure_s: float | None = N
     is taken as half of the time between frames.
 
     Raises:
-        BadInput: the rate or the exposure is not positive, or the recording has too few strokes.
-        StageFailed: no marker is seen in half of the frames.
+        BadInput: the rate or the exposure is not positive.
+        StageFailed: the recording has too few strokes.
     """
     _check(tracks, rate_hz, exposure_s)
-    filled = breathing_signal(tracks).filled
+    try:
+        filled = breathing_signal(tracks).filled
+    except StageFailed as error:
+        return Displacement(rate_hz, np.nan, np.nan, tracks.frames_per_s, Status.UNOBSERVABLE, (str(error),))
     fresh = fresh_frames(tracks)
     frames_per_s = tracks.frames_per_s * float(fresh.mean())
     exposure = 0.5 / frames_per_s if exposure_s is None else exposure_s

@@ -71,6 +71,8 @@ def on_plane(
     points = np.full((*tracks.states.shape, 3), np.nan)
     covariance = np.full((*tracks.states.shape, 3, 3), np.nan)
     for n, seen in enumerate(tracks.seen):
+        if not seen.any():
+            continue
         pose = room_from_camera[n if len(room_from_camera) > 1 else 0]
         pixels = tracks.places[n, seen][:, None, :] + steps
         rays = directions(camera, pixels.reshape(-1, 2)) @ pose.rotation.T

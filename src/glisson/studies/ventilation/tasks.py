@@ -126,7 +126,7 @@ def _swept(sweep: Sweep, seed: int, noise_px: float | None) -> tuple[dict[str, A
         tracks, _ = _tracks_of(video, noise_px, sweep.repeats, seed + number)
         tracks = _in_mm(video, tracks)
         found.append(displacement_at(tracks, float(rate), sweep.told_exposure_s))
-        if rate in SHOWN_HZ:
+        if rate in SHOWN_HZ and tracks.seen.any():
             marker = int(np.argmax(tracks.seen.mean(axis=0)))
             ways |= {f"times {rate:g}": tracks.times_s, f"values {rate:g}": _along(tracks.places[:, marker])}
     plateau = find_plateau(found)
@@ -146,7 +146,8 @@ def _swept(sweep: Sweep, seed: int, noise_px: float | None) -> tuple[dict[str, A
 
 def _measured(found: Displacement) -> dict[str, Any]:
     return {
-        "rate_hz": found.rate_hz, "displacement_mm": found.value, "sigma_mm": found.sigma, "status": found.status,
+        "rate_hz": found.rate_hz, "displacement_mm": found.value if np.isfinite(found.value) else None,
+        "sigma_mm": found.sigma if np.isfinite(found.sigma) else None, "status": found.status,
         "frames_per_s": found.frames_per_s,
     }  # fmt: skip
 
