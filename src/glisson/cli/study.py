@@ -79,7 +79,7 @@ def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
 def _study(arguments: argparse.Namespace) -> Study:
     for option, studies in _OWN_OPTIONS.items():
         if getattr(arguments, option) and arguments.study not in studies:
-            raise BadInput(f"--{option} is for the study {' or '.join(studies)}; {arguments.study} does not have it.")
+            raise BadInput(f"{arguments.study} has no --{option}; that is for the study {', '.join(studies)}.")
     seed = _whole_number(arguments.seed, "--seed", 0) or 0
     if arguments.study == LiftRobustness.name:
         return LiftRobustness.of(arguments.quick, seed)
