@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from glisson.core.arrays import FloatArray
 
@@ -15,9 +16,9 @@ class Shutter:
     exposure_s: float = 0.008
     readout_s: float = 0.010
 
-    def begins(self, frame: int | FloatArray, row: float | FloatArray, height: int) -> FloatArray:
+    def begins(self, frame: ArrayLike, row: ArrayLike, height: int) -> FloatArray:
         """When the exposure of a row of a frame begins (s)."""
-        return np.asarray(frame / self.frames_per_s + self.readout_s * np.asarray(row) / height)
+        return np.asarray(np.asarray(frame) / self.frames_per_s + self.readout_s * np.asarray(row) / height)
 
     def middles(self, frame_count: int, height: int) -> FloatArray:
         """The middle of the exposure of the middle row of each frame (s)."""

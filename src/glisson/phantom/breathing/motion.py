@@ -9,7 +9,6 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import PchipInterpolator
 
 from glisson.core.arrays import FloatArray
 
@@ -37,7 +36,7 @@ class Breaths:
     Args:
         starts_s: moments of full exhalation (k + 1,); a breath lies between each two.
         depths: of the breaths (k,), about 1.
-        levels: `along` at the moments of full exhalation (k + 1,), about 0: the drift.
+        levels: `along` at the moments of full exhalation (k + 1,), about 0: the drift, easing from one to the next.
     """
 
     starts_s: FloatArray
@@ -52,7 +51,9 @@ class Breaths:
     def along(self, times_s: ArrayLike) -> FloatArray:
         """As `Motion.along`."""
         phase = self.phase(times_s)
-        drift = PchipInterpolator(self.starts_s, self.levels)(np.asarray(times_s, dtype=np.float64))
+        breath = np.clip(phase.astype(np.int64), 0, len(self.depths) - 1)
+        share = 0.5 - 0.5 * np.cos(np.pi * np.clip(phase - breath, 0.0, 1.0))
+        drift = self.levels[breath] + share * (self.levels[breath + 1] - self.levels[breath])
         return np.asarray(drift + self._depth(phase) * waveform(phase % 1.0))
 
     def across(self, times_s: ArrayLike) -> FloatArray:
@@ -69,20 +70,21 @@ class Breaths:
 
 @dataclass(frozen=True)
 class Ventilator:
-    """High-frequency ventilation: `rate_hz` strokes per second, all alike, the first begun at `start_s`."""
+    """High-frequency ventilation: `rate_hz` strokes per second of one `depth`, the first begun at `start_s`."""
 
     rate_hz: float
+    depth: float = 1.0
     start_s: float = 0.0
 
     def along(self, times_s: ArrayLike) -> FloatArray:
         """As `Motion.along`."""
         turn = 2.0 * np.pi * self.rate_hz * (np.asarray(times_s, dtype=np.float64) - self.start_s)
-        return np.asarray(0.5 - 0.5 * np.cos(turn))
+        return np.asarray(self.depth * (0.5 - 0.5 * np.cos(turn)))
 
     def across(self, times_s: ArrayLike) -> FloatArray:
         """As `Motion.across`."""
         turn = 2.0 * np.pi * self.rate_hz * (np.asarray(times_s, dtype=np.float64) - self.start_s)
-        return np.asarray(np.sin(turn))
+        return np.asarray(self.depth * np.sin(turn))
 
 
 def waveform(within: FloatArray) -> FloatArray:

@@ -1,6 +1,7 @@
 """A patch of liver with burnt marks, and how the lungs move it: every point by an affine map of its place."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -31,7 +32,7 @@ class Tissue:
         side_mm: (3,) and
         side_by_place: (3, 2) the same across.
         marks_mm: (m, 2) places of the burnt marks.
-        texture: [row, column, red green blue], TEXEL_MM a side, its middle the patch's.
+        seed: of the texture.
     """
 
     middle_mm: FloatArray
@@ -41,7 +42,7 @@ class Tissue:
     side_mm: FloatArray
     side_by_place: FloatArray
     marks_mm: FloatArray
-    texture: NDArray[np.uint8]
+    seed: int
 
     def frames(self, motion: Motion, times_s: ArrayLike) -> FloatArray:
         """Matrices (…, 3, 3) that take (x, y, 1) to the camera's frame (mm) at times (…)."""
@@ -52,10 +53,15 @@ class Tissue:
         side = np.column_stack([self.side_by_place, self.side_mm])
         return np.asarray(rest + along * main + across * side)
 
-    def marks_at(self, motion: Motion, times_s: ArrayLike) -> FloatArray:
-        """Places (…, m, 3) of the marks in the camera's frame (mm) at times (…)."""
+    def marks_at(self, motion: Motion, times_s: FloatArray) -> FloatArray:
+        """Places (…, m, 3) of the marks in the camera's frame (mm) at times (…, m), or (…, 1) for all the same."""
         flat = np.column_stack([self.marks_mm, np.ones(len(self.marks_mm))])
-        return np.asarray(flat @ np.swapaxes(self.frames(motion, times_s), -1, -2))
+        return np.asarray((self.frames(motion, times_s) @ flat[:, :, None])[..., 0])
+
+    @cached_property
+    def texture(self) -> NDArray[np.uint8]:
+        """What the patch looks like [row, column, red green blue], TEXEL_MM a side, its middle the patch's."""
+        return _texture(self.marks_mm, np.random.default_rng([self.seed, 52]))
 
 
 def draw_tissue(excursion_mm: float, random: np.random.Generator, marks: int = 20) -> Tissue:
@@ -71,7 +77,7 @@ def draw_tissue(excursion_mm: float, random: np.random.Generator, marks: int = 2
     middle = np.array([0.0, 0.4 * excursion_mm, random.uniform(84.0, 96.0)])
     uneven = random.normal(0.0, 0.0012, (3, 2)) * excursion_mm
     places = _places(marks, random)
-    return Tissue(middle, axes, main, uneven, side, 0.1 * uneven, places, _texture(places, random))
+    return Tissue(middle, axes, main, uneven, side, 0.1 * uneven, places, int(random.integers(2**31)))
 
 
 def _places(count: int, random: np.random.Generator) -> FloatArray:

@@ -23,7 +23,7 @@ _STILL_PX = 0.4
 
 _MOST_MOMENTS = 8
 _TRUE_MOMENTS = 16
-_ROW_STEPS = 3
+_ROW_STEPS = 4
 _NOISE_SHIFTS = 61
 
 
@@ -47,19 +47,18 @@ class BreathingVideo:
         It is their mean over the exposure of the row in which they are seen.
         """
         height = self.camera.height
-        frames = np.arange(self.frame_count, dtype=np.float64)[:, None]
-        rows = np.full((self.frame_count, len(self.tissue.marks_mm)), 0.5 * height)
+        frames = np.arange(self.frame_count)[:, None]
+        seen = np.zeros((self.frame_count, len(self.tissue.marks_mm), 2))
         for _ in range(_ROW_STEPS):
-            begins = self.shutter.begins(frames, rows, height)
-            seen = self._seen(begins[..., None] + self.shutter.moments(_TRUE_MOMENTS)).mean(axis=2)
-            rows = seen[..., 1]
+            begins = self.shutter.begins(frames, seen[:, :, 1], height)
+            seen = self._seen(begins + self.shutter.moments(_TRUE_MOMENTS)[:, None, None]).mean(axis=0)
         return seen
 
     def marks_visible(self) -> NDArray[np.bool_]:
         """Whether the middle of a mark (frames, m) lies in the image and under nothing that passes."""
         places = self.marks_px()
         size = np.array([self.camera.width, self.camera.height])
-        inside = ((places > 0.0) & (places < size - 1.0)).all(axis=2)
+        inside: NDArray[np.bool_] = np.all((places > 0.0) & (places < size - 1.0), axis=2)
         cells = np.clip(np.rint(places), 0, size - 1).astype(int)
         for n, time in enumerate(self.times_s):
             for thing in self.passing:
@@ -88,7 +87,7 @@ class BreathingVideo:
                 if mask is not None:
                     light += (mask / np.float32(255.0))[:, :, None] * (np.array(thing.colour, np.float32) - light)
             if self.sensor.blur_px > 0.0:
-                light = cv2.GaussianBlur(light, (0, 0), self.sensor.blur_px, dst=light)
+                cv2.GaussianBlur(light, (0, 0), self.sensor.blur_px, dst=light)
             down, across = random.integers(0, _NOISE_SHIFTS, 2)
             image = np.zeros((height, width, 3), dtype=np.uint8)
             spread = np.float32(self.sensor.noise), np.float32(self.sensor.shot_noise)
@@ -99,8 +98,8 @@ class BreathingVideo:
         """The mean over a frame's exposure of what comes from the tissue, in 0 to 1."""
         height, width = self.camera.height, self.camera.width
         begins = self.shutter.begins(frame, np.arange(height), height)
-        moved = np.diff(self._seen(begins[height // 2] + self.shutter.moments(_TRUE_MOMENTS)), axis=1)
-        path = float(np.linalg.norm(moved, axis=2).sum(axis=1).max())
+        moved = np.diff(self._seen((begins[height // 2] + self.shutter.moments(_TRUE_MOMENTS))[:, None]), axis=0)
+        path = float(np.linalg.norm(moved, axis=2).sum(axis=0).max())
         count = min(int(path / _STILL_PX) + 1, _MOST_MOMENTS)
         light = np.zeros((height, width, 3), dtype=np.float32)
         for moment in self.shutter.moments(count):
@@ -109,17 +108,13 @@ class BreathingVideo:
         return light
 
     def _seen(self, times_s: FloatArray) -> FloatArray:
-        """Pixels of the marks: of times (n,) as (m, n, 2), of times (frames, m, n) each mark's own (frames, m, n, 2)."""
-        if times_s.ndim == 1:
-            points = np.swapaxes(self.tissue.marks_at(self.motion, times_s), 0, 1)
-        else:
-            all_marks = self.tissue.marks_at(self.motion, times_s)
-            points = np.take_along_axis(all_marks, _own(times_s.shape), axis=3)[:, :, :, 0, :]
-        return seen_at(self.camera, points.reshape(-1, 3)).reshape(*points.shape[:-1], 2)
+        """Pixels (…, m, 2) of the marks at times (…, m) or (…, 1)."""
+        points = self.tissue.marks_at(self.motion, times_s)
+        return np.asarray(seen_at(self.camera, points.reshape(-1, 3)).reshape(*points.shape[:-1], 2))
 
     def _middle_px(self, frame: int) -> FloatArray:
         middle = self.tissue.frames(self.motion, self.times_s[frame])[:, 2]
-        return seen_at(self.camera, middle[None])[0]
+        return np.asarray(seen_at(self.camera, middle[None])[0])
 
     @cached_property
     def _slopes(self) -> NDArray[np.float32]:
@@ -131,11 +126,6 @@ class BreathingVideo:
         down = np.linspace(-1.0, 1.0, self.camera.height)[:, None]
         across = np.linspace(-1.0, 1.0, self.camera.width)[None, :]
         return np.asarray(255.0 * (1.0 - 0.5 * self.sensor.fall_off * (down**2 + across**2)), dtype=np.float32)
-
-
-def _own(shape: tuple[int, ...]) -> NDArray[np.int64]:
-    """Indices (frames, m, n, 1, 1) of each mark's own number."""
-    return np.arange(shape[1])[None, :, None, None, None] * np.ones((shape[0], 1, shape[2], 1, 1), dtype=np.int64)
 
 
 @compiled
