@@ -134,15 +134,14 @@ def _period(values: FloatArray, times: FloatArray) -> float:
     centred = values - np.polynomial.Polynomial.fit(times, values, 1)(times)
     n = len(centred)
     products = np.fft.irfft(np.abs(np.fft.rfft(centred, 2 * n)) ** 2)[:n]
-    # Of long lags there are few products.
-    likeness = products / max(products[0], 1e-300) * n / np.maximum(n - np.arange(n), 0.25 * n)
+    # Not divided by the number of products, so that one breath wins against several.
+    likeness = products / max(products[0], 1e-300)
     negative = np.flatnonzero(likeness < 0.0)
     if len(negative):
-        tops, _ = find_peaks(likeness[: int(0.75 * n)], height=_REPEATS)
+        tops, _ = find_peaks(likeness, height=_REPEATS)
         tops = tops[tops > negative[0]]
         if len(tops):
-            # The first one that is nearly as good as the best: later ones are two breaths and more.
-            return float(step * tops[np.flatnonzero(likeness[tops] > 0.8 * likeness[tops].max())[0]])
+            return float(step * tops[np.argmax(likeness[tops])])
     raise StageFailed(
         "Nothing in the markers' motion repeats itself as breathing does, at least twice in the recording.",
         Status.UNOBSERVABLE,
@@ -156,7 +155,7 @@ def _turns(smooth: FloatArray, period_frames: float) -> tuple[NDArray[np.int64],
     if len(tops) < 2:
         return tops, tops
     lows = [int(a + np.argmin(smooth[a:b])) for a, b in pairwise(tops)]
-    # A breath at an end counts where its full exhalation is in the recording.
+    # A breath at an end counts where its full exhalation is in the recording, and the rise that tells when it ended.
     before, after = smooth[: tops[0]], smooth[tops[-1] :]
     low, height = np.median(smooth[lows]), np.median(smooth[tops])
     full = low + _NEARLY * (height - low)
@@ -164,7 +163,7 @@ def _turns(smooth: FloatArray, period_frames: float) -> tuple[NDArray[np.int64],
         lows.insert(0, int(np.argmin(before)))
     else:
         tops = tops[1:]
-    if after.min() < full and np.argmin(after) < len(after) - 1:
+    if after.min() < full <= after[np.argmin(after) :].max():
         lows.append(int(tops[-1] + np.argmin(after)))
     else:
         tops = tops[:-1]

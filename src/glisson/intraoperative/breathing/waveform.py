@@ -13,6 +13,9 @@ PIECES = 20
 """Cubic pieces of a breath's shape."""
 
 _ROUNDS, _EVALUATIONS = 3, 8
+_INTO_NEXT = 0.5
+"""So much of an inhalation after the last exhalation is fitted, too."""
+
 _LEAST_PART, _FORBIDDEN = 0.02, 1e3
 """Knots keep this share of a period apart: nearer ones are given a misfit of so many depths."""
 
@@ -23,7 +26,10 @@ _LOOKED_BACK = 700
 
 @dataclass(frozen=True, eq=False)
 class Knots:
-    """Full exhalations (k + 1,) and inhalations (k,) in s, and the depths of the breaths and levels they end at."""
+    """Full exhalations (k + 1,) and inhalations (k,) in s, and the depths of the breaths and levels they end at.
+
+    While they are fitted there is one inhalation (and depth) more, after the last exhalation.
+    """
 
     exhalations_s: FloatArray
     inhalations_s: FloatArray
@@ -45,11 +51,11 @@ class Knots:
 
     @property
     def line(self) -> tuple[FloatArray, FloatArray]:
-        """The knots' times and phases (2 k + 1,)."""
-        k = len(self.inhalations_s)
-        at, values = np.zeros(2 * k + 1), np.zeros(2 * k + 1)
+        """The knots' times and phases, one exhalation and one inhalation after the other."""
+        exhalations, inhalations = len(self.exhalations_s), len(self.inhalations_s)
+        at, values = np.zeros(exhalations + inhalations), np.zeros(exhalations + inhalations)
         at[0::2], at[1::2] = self.exhalations_s, self.inhalations_s
-        values[0::2], values[1::2] = np.arange(k + 1), np.arange(k) + self.inhalation_phase
+        values[0::2], values[1::2] = np.arange(exhalations), np.arange(inhalations) + self.inhalation_phase
         return at, values
 
 
@@ -68,21 +74,32 @@ def fitted_knots(times_s: FloatArray, values: FloatArray, start: Knots) -> Knots
     The shape and the knots are fitted by turns. Full exhalation is where the shape begins to rise, full inhalation its
     greatest value: the shape of all breaths together knows these places much better than one breath does.
     """
-    inside = (times_s >= start.exhalations_s[0]) & (times_s <= start.exhalations_s[-1])
+    levels = np.interp(start.exhalations_s, times_s, values)
+    depths = np.interp(start.inhalations_s, times_s, values) - 0.5 * (levels[1:] + levels[:-1])
+    into = start.inhalations_s - start.exhalations_s[:-1]
+    share = float(np.clip((into / np.diff(start.exhalations_s)).mean(), 0.1, 0.9))
+    # When an exhalation has ended is told by the rise after it, of the last one, too.
+    knots = Knots(
+        start.exhalations_s,
+        np.append(start.inhalations_s, start.exhalations_s[-1] + into.mean()),
+        np.append(depths, depths.mean()),
+        levels,
+        share,
+    )
+    end = start.exhalations_s[-1] + _INTO_NEXT * into.mean()
+    inside = (times_s >= start.exhalations_s[0]) & (times_s <= end)
     times, values = times_s[inside], values[inside]
-    levels = np.interp(start.exhalations_s, times, values)
-    depths = np.interp(start.inhalations_s, times, values) - 0.5 * (levels[1:] + levels[:-1])
-    share = (start.inhalations_s - start.exhalations_s[:-1]) / np.diff(start.exhalations_s)
-    knots = replace(start, depths=depths, levels=levels, inhalation_phase=float(np.clip(share.mean(), 0.1, 0.9)))
     for _ in range(_ROUNDS):
         shape = _shape(knots, times, values)
         knots = _moved(knots, shape, times, values)
         knots = _anchored(knots, _shape(knots, times, values))
-    return knots
+    whole = len(knots.exhalations_s) - 1
+    return replace(knots, inhalations_s=knots.inhalations_s[:whole], depths=knots.depths[:whole])
 
 
 def _level(knots: Knots, times: FloatArray) -> FloatArray:
-    return np.asarray(PchipInterpolator(knots.exhalations_s, knots.levels)(times))
+    inside = np.minimum(times, knots.exhalations_s[-1])
+    return np.asarray(PchipInterpolator(knots.exhalations_s, knots.levels)(inside))
 
 
 def _depth(knots: Knots, phase: FloatArray) -> FloatArray:
@@ -100,18 +117,19 @@ def _shape(knots: Knots, times: FloatArray, values: FloatArray) -> FloatArray:
 
 def _moved(knots: Knots, shape: FloatArray, times: FloatArray, values: FloatArray) -> Knots:
     """The knots moved, and depths and levels changed, so that the shape fits best."""
-    k = len(knots.inhalations_s)
+    exhalations, inhalations = len(knots.exhalations_s), len(knots.inhalations_s)
+    ends = np.cumsum([exhalations, inhalations, inhalations, exhalations])
     period, scale = float(np.mean(np.diff(knots.exhalations_s))), float(np.mean(knots.depths))
     start = periodic_basis(np.zeros(1))
 
     def made(parameters: FloatArray) -> Knots:
-        moves = period * parameters[: 2 * k + 1]
+        out, into, depths, levels = np.split(parameters, ends[:-1])
         return replace(
             knots,
-            exhalations_s=knots.exhalations_s + moves[: k + 1],
-            inhalations_s=knots.inhalations_s + moves[k + 1 :],
-            depths=knots.depths + scale * parameters[2 * k + 1 : 3 * k + 1],
-            levels=knots.levels + scale * parameters[3 * k + 1 :],
+            exhalations_s=knots.exhalations_s + period * out,
+            inhalations_s=knots.inhalations_s + period * into,
+            depths=knots.depths + scale * depths,
+            levels=knots.levels + scale * levels,
         )
 
     def off(parameters: FloatArray) -> FloatArray:
@@ -123,19 +141,19 @@ def _moved(knots: Knots, shape: FloatArray, times: FloatArray, values: FloatArra
         fit = (periodic_basis(phase) - start) @ shape
         return np.asarray(_level(changed, times) + _depth(changed, phase) * fit - values)
 
-    found = least_squares(off, np.zeros(4 * k + 2), jac_sparsity=_sparsity(knots, times), max_nfev=_EVALUATIONS)
+    sparsity = _sparsity(knots, times)
+    found = least_squares(off, np.zeros(ends[-1]), jac_sparsity=sparsity, max_nfev=_EVALUATIONS)
     return made(found.x)
 
 
 def _sparsity(knots: Knots, times: FloatArray) -> csr_matrix:
     """Which frames (n) each parameter can change: those of the breaths beside it."""
-    k = len(knots.inhalations_s)
-    breath = np.clip(np.searchsorted(knots.exhalations_s, times, side="right") - 1, 0, k - 1)
-    own = breath[:, None] - np.arange(k)[None, :]
-    ends = breath[:, None] - np.arange(k + 1)[None, :]
-    near = (ends >= -2) & (ends <= 1)
-    wide = (ends >= -3) & (ends <= 2)
-    return csr_matrix(np.hstack([near, np.abs(own) <= 1, np.abs(own) <= 1, wide]).astype(np.int8))
+    inhalations, exhalations = len(knots.inhalations_s), len(knots.exhalations_s)
+    breath = np.clip(np.searchsorted(knots.exhalations_s, times, side="right") - 1, 0, inhalations - 1)
+    own = np.abs(breath[:, None] - np.arange(inhalations)[None, :]) <= 1
+    ends = breath[:, None] - np.arange(exhalations)[None, :]
+    near, wide = (ends >= -2) & (ends <= 1), (ends >= -3) & (ends <= 2)
+    return csr_matrix(np.hstack([near, own, own, wide]).astype(np.int8))
 
 
 def _anchored(knots: Knots, shape: FloatArray) -> Knots:
@@ -153,11 +171,11 @@ def _anchored(knots: Knots, shape: FloatArray) -> Knots:
     through = [_last_below(shares, level) for level in (0.025, 0.1)]
     low = 1e-3 * (before[0] + 2.0 * through[0] - through[1])
     high = 1e-3 * top
-    k = np.arange(len(knots.exhalations_s), dtype=np.float64)
+    exhalations = np.arange(len(knots.exhalations_s), dtype=np.float64)
     return replace(
         knots,
-        exhalations_s=knots.moments(k + low),
-        inhalations_s=knots.moments(k[:-1] + high),
+        exhalations_s=knots.moments(exhalations + low),
+        inhalations_s=knots.moments(exhalations[: len(knots.inhalations_s)] + high),
         inhalation_phase=high - low,
     )
 

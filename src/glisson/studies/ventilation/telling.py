@@ -19,6 +19,8 @@ def as_lines(values: Mapping[str, Any]) -> list[str]:
         )
     for name, words in (("simulated", "simulated tracks"), ("from_pixels", "from rendered pixels")):
         found = values["phase"][name]
+        if found["failed"]:
+            lines.append(f"breaths   {found['failed']} recordings, {words}, without an answer")
         if found["phase_worst"] is not None:
             phase, left = found["phase_worst"], found["residual_mm"]
             lines.append(
