@@ -13,7 +13,7 @@ from glisson.core.status import Status
 
 State = TypeVar("State")
 
-_ITERATIONS = 100
+_ITERATIONS = 300
 _LEAST_GAIN = 1e-10
 _MOST_DAMPING = 1e8
 _SINGULAR = 1e-13
@@ -49,25 +49,29 @@ def minimum(
     Raises:
         StageFailed: it does not come to rest.
     """
-    state, here, damping = start, equations_at(start), 1e-4
+    state, here, damping, growth = start, equations_at(start), 1e-4, 2.0
     for _ in range(_ITERATIONS):
         scale = np.diag(here.matrix) + 1e-12 * np.trace(here.matrix)
         try:
             step = cho_solve(cho_factor(here.matrix + damping * np.diag(scale)), -here.gradient)
         except LinAlgError:
-            damping *= 10.0
+            damping, growth = damping * growth, 2.0 * growth
             continue
         tried = moved(state, step)
         there = equations_at(tried)
         if there.cost < here.cost:
             gain = here.cost - there.cost
-            state, here, damping = tried, there, max(damping * 0.1, 1e-12)
-            if gain < _LEAST_GAIN * here.cost:
+            promised = 0.5 * float(step @ (damping * scale * step - here.gradient))
+            # The damping falls by as much as the equations kept their promise (Nielsen 1999).
+            damping, growth = damping * max(1.0 / 3.0, 1.0 - (2.0 * gain / promised - 1.0) ** 3), 2.0
+            settled = gain < _LEAST_GAIN * here.cost
+            state, here = tried, there
+            if settled:
                 return Minimum(state, here)
         elif damping > _MOST_DAMPING:
             return Minimum(state, here)  # no step is short enough to gain anything
         else:
-            damping *= 10.0
+            damping, growth = damping * growth, 2.0 * growth
     raise StageFailed(
         "Poses and points could not be brought together; check what was given, or take more views.",
         Status.ITERATION_LIMIT,
