@@ -31,7 +31,7 @@ class View:
         if (pose.target, pose.source) != ("room", "camera"):
             raise BadInput(f"The pose of {self.name} is {pose.target}_from_{pose.source}; give room_from_camera.")
         if pose.covariance is None:
-            raise BadInput(f"The pose of {self.name} needs a covariance.")
+            raise BadInput(f"The pose of {self.name} needs a positive definite covariance.")
         frozen_covariance(pose.covariance, (6, 6), f"the covariance of the pose of {self.name}")
         object.__setattr__(self, "tip_px", frozen_floats(self.tip_px, (2,), f"tip in {self.name}"))
 
