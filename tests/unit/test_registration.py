@@ -195,7 +195,10 @@ def test_an_incompressible_bend_is_followed_by_the_free_body(model: Model) -> No
     rng = np.random.default_rng(2)
     whole = replace(model, node_sets={"upper": np.unique(model.mesh.boundary()[0])})
     there = bent(model.mesh.nodes, 130.0)
-    seen = Observations((seen_surface(whole, there, rng, 0.2, count=1500),))
+    corners = {f"corner {number}": [number] for number in (0, 27, 180, 340)}
+    whole = replace(whole, node_sets={**whole.node_sets, **corners})
+    marks = [Observation("landmark", name, there[nodes], 0.2, "room") for name, nodes in corners.items()]
+    seen = Observations((seen_surface(whole, there, rng, 0.2, count=1500), *marks))
     inside = PointLocator(model.mesh)
     targets = inside.locate(0.6 * (model.mesh.nodes - model.mesh.nodes.mean(axis=0)) + model.mesh.nodes.mean(axis=0))
     errors = {}

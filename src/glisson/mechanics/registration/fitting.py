@@ -1,6 +1,5 @@
 """Gauss–Newton over a motion: what was seen pulls at material points, which are found anew at every step."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,13 +10,13 @@ from glisson.core.errors import StageFailed
 from glisson.core.status import Status
 from glisson.mechanics.registration.motion import Motion, MotionState
 from glisson.mechanics.registration.outliers import CUTS, judged
+from glisson.mechanics.registration.rest import Rest
 from glisson.mechanics.registration.rows import Rows
 from glisson.mechanics.registration.seen import Seen
 
 _ITERATIONS = 200
-_AT_REST = 1e-5
-"""A step that promises to lower half the sum of squares by less than this is nothing beside its noise, which is 1."""
-
+_AT_REST, _NEARLY = 1e-4, 1e-2
+_MOST_DAMPING = 1e6
 _LONGEST_MM = 15.0
 
 
@@ -28,7 +27,7 @@ class Fit:
     Args:
         state: of the motion.
         rows: what was seen, there.
-        weights: (p,) how much each observed point counts, 0 to 1.
+        beliefs: (p,) how far each observed point is believed, 0 to 1.
         data, prior: Hessians (size, size) of what was seen and of the motion's own cost.
         gradient: (size,) of the cost.
         cost: half the sum of all squares.
@@ -36,14 +35,14 @@ class Fit:
 
     state: MotionState
     rows: Rows
-    weights: FloatArray
+    beliefs: FloatArray
     data: FloatArray
     prior: FloatArray
     gradient: FloatArray
     cost: float
 
 
-def fit(motion: Motion, seen: Seen, start: MotionState, told: Callable[[int], None] = lambda step: None) -> Fit:
+def fit(motion: Motion, seen: Seen, start: MotionState) -> Fit:
     """The state that explains what was seen at the least cost (Geman and McClure's function for outliers).
 
     Raises:
@@ -51,16 +50,15 @@ def fit(motion: Motion, seen: Seen, start: MotionState, told: Callable[[int], No
     """
     state = start
     for cut in CUTS:
-        found = _descend(motion, seen, state, cut, told)
+        found = _descend(motion, seen, state, cut, Rest(_AT_REST if cut == CUTS[-1] else _NEARLY))
         state = found.state
     return found
 
 
-def _descend(motion: Motion, seen: Seen, state: MotionState, cut: float, told: Callable[[int], None]) -> Fit:
+def _descend(motion: Motion, seen: Seen, state: MotionState, cut: float, rest: Rest) -> Fit:
     damping = 1e-6
     here = _at(motion, seen, state, cut)
-    for step_number in range(_ITERATIONS):
-        told(step_number)
+    for _ in range(_ITERATIONS):
         matrix = here.data + here.prior
         scale = np.diag(matrix) + 1e-9 * np.trace(matrix) / len(matrix)
         try:
@@ -68,17 +66,13 @@ def _descend(motion: Motion, seen: Seen, state: MotionState, cut: float, told: C
         except LinAlgError:
             damping = max(10.0 * damping, 1e-6)
             continue
-        length = _length(step)
-        step *= min(1.0, _LONGEST_MM / max(length, 1e-12))
-        if -float(here.gradient @ step) < _AT_REST and length < _LONGEST_MM:
-            return here
+        step *= min(1.0, _LONGEST_MM / max(_length(step), 1e-12))
         there = _at(motion, seen, motion.moved(here.state, step), cut)
         if there.cost < here.cost:
-            settled = here.cost - there.cost < _AT_REST
             damping, here = max(damping / 5.0, 1e-9), there
-            if settled:
+            if rest.reached(here.cost):
                 return here
-        elif damping < 1e6:
+        elif damping < _MOST_DAMPING:
             damping *= 5.0
         else:
             return here
@@ -90,9 +84,9 @@ def _at(motion: Motion, seen: Seen, state: MotionState, cut: float) -> Fit:
     judgement = judged(rows, seen.count, cut)
     own, pull, prior = motion.prior(state)
     jacobian = _jacobian(motion, state, rows)
-    weighted = jacobian * judgement.weights[rows.point, None]
+    weighted = jacobian * judgement.weights[:, None]
     gradient = pull - weighted.T @ rows.residuals
-    return Fit(state, rows, judgement.weights, weighted.T @ jacobian, prior, gradient, judgement.cost + own)
+    return Fit(state, rows, judgement.beliefs, weighted.T @ jacobian, prior, gradient, judgement.cost + own)
 
 
 def _jacobian(motion: Motion, state: MotionState, rows: Rows) -> FloatArray:

@@ -61,4 +61,4 @@ class Free:
             spread = full.posterior_spread(found, chosen.modes)
         finally:
             full.close()
-        return outcome(model, observations.frame, found.positions, spread, found.weights, place.ambiguous)
+        return outcome(model, observations.frame, found.positions, spread, found.beliefs, place.ambiguous)

@@ -13,11 +13,12 @@ from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.linear_solvers import make_direct_solver
 from glisson.mechanics.pattern import FreeSystem, Stiffness, block_pattern
 from glisson.mechanics.registration.outliers import CUTS, judged
+from glisson.mechanics.registration.rest import Rest
 from glisson.mechanics.registration.rows import Rows
 from glisson.mechanics.registration.seen import Seen
 
 _ITERATIONS = 60
-_AT_REST = 1e-4
+_AT_REST, _NEARLY = 1e-4, 1e-1
 _SHORTEST = 1e-4
 _HOLDING = 1e-6
 """Stiffness per node (1/mm²) that keeps the matrix regular where nothing holds a rigid motion."""
@@ -25,10 +26,11 @@ _HOLDING = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class FullState:
-    """Node positions (n, 3), what was seen there, how much each observed point counts (p,), and the cost."""
+    """Nodes (n, 3), the rows there, how far each point is believed (p,), what each row counts (r,), the cost."""
 
     positions: FloatArray
     rows: Rows
+    beliefs: FloatArray
     weights: FloatArray
     cost: float
 
@@ -57,7 +59,7 @@ class FullFit:
             StageFailed: it does not come to rest.
         """
         for cut in CUTS:
-            found = self._descend(positions, cut)
+            found = self._descend(positions, cut, Rest(_AT_REST if cut == CUTS[-1] else _NEARLY))
             positions = found.positions
         return found
 
@@ -79,7 +81,7 @@ class FullFit:
         """Give the factor's memory back."""
         self._solver.close()
 
-    def _descend(self, positions: FloatArray, cut: float) -> FullState:
+    def _descend(self, positions: FloatArray, cut: float, rest: Rest) -> FullState:
         here = self._at(positions, cut)
         for _ in range(_ITERATIONS):
             gradient = self._gradient(here)
@@ -92,10 +94,10 @@ class FullFit:
             while there.cost > here.cost - 1e-4 * share * promised and share > _SHORTEST:
                 share *= 0.5
                 there = self._at(here.positions + share * step, cut)
-            gained = here.cost - there.cost
-            if gained > 0.0:
-                here = there
-            if gained < _AT_REST:
+            if there.cost >= here.cost:
+                return here  # no step is short enough to gain anything
+            here = there
+            if rest.reached(here.cost):
                 return here
         raise StageFailed("The organ does not come to rest on what was seen.", Status.ITERATION_LIMIT)
 
@@ -103,11 +105,11 @@ class FullFit:
         rows = self._seen.rows(positions)
         judgement = judged(rows, self._seen.count, cut)
         energy = self._elasticity.energy(positions) / self._energy_uj
-        return FullState(positions, rows, judgement.weights, judgement.cost + energy)
+        return FullState(positions, rows, judgement.beliefs, judgement.weights, judgement.cost + energy)
 
     def _gradient(self, here: FullState) -> FloatArray:
         rows = here.rows
-        pull = (here.weights[rows.point] * rows.residuals / rows.sigma_mm)[:, None] * rows.directions
+        pull = (here.weights * rows.residuals / rows.sigma_mm)[:, None] * rows.directions
         gradient = self._elasticity.forces(here.positions) / self._energy_uj
         np.add.at(gradient, rows.nodes, -rows.weights[:, :, None] * pull[:, None])
         return gradient
@@ -117,7 +119,7 @@ class FullFit:
         self._elasticity.add_stiffness(here.positions, self._pattern, blocks, project)
         blocks /= self._energy_uj
         rows = here.rows
-        scaled = rows.directions * (np.sqrt(here.weights[rows.point]) / rows.sigma_mm)[:, None]
+        scaled = rows.directions * (np.sqrt(here.weights) / rows.sigma_mm)[:, None]
         outer = np.einsum("ra,rb,ri,rj->rabij", rows.weights, rows.weights, scaled, scaled)
         self._pattern.add_groups(rows.nodes, outer, blocks)
         self._pattern.add_diagonal(np.full(len(here.positions), _HOLDING), blocks)

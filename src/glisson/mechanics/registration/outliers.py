@@ -14,8 +14,9 @@ CUTS = (8.0 * _CUT, 4.0 * _CUT, 2.0 * _CUT, _CUT)
 
 @dataclass(frozen=True, eq=False)
 class Judgement:
-    """How much each observed point counts (p,), 0 to 1, and what all of them cost."""
+    """How far each observed point is believed (p,), 0 to 1, how much each row counts (r,), and what all rows cost."""
 
+    beliefs: FloatArray
     weights: FloatArray
     cost: float
 
@@ -25,4 +26,8 @@ def judged(rows: Rows, count: int, cut: float) -> Judgement:
     squares = rows.squares(count)
     may_lie = np.bincount(rows.point, rows.robust, minlength=count) > 0.0
     share = 1.0 / (1.0 + squares / cut**2)
-    return Judgement(np.where(may_lie, share**2, 1.0), 0.5 * float(np.where(may_lie, squares * share, squares).sum()))
+    beliefs = np.where(may_lie, share**2, 1.0)
+    worth = np.ones(count)
+    worth[rows.point] = rows.worth
+    cost = 0.5 * float(worth @ np.where(may_lie, squares * share, squares))
+    return Judgement(beliefs, beliefs[rows.point] * rows.worth, cost)

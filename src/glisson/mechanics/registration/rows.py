@@ -19,6 +19,7 @@ class Rows:
         gaps_mm: (r,) direction · (seen − point).
         sigma_mm: (r,) standard deviation of the gap.
         point: (r,) number of the observed point that the row belongs to; its rows count or are set aside together.
+        worth: (r,) how much the point counts beside others that are off together with it, 0 to 1.
         robust: (r,) whether the point may be an outlier.
     """
 
@@ -28,6 +29,7 @@ class Rows:
     gaps_mm: FloatArray
     sigma_mm: FloatArray
     point: IntArray
+    worth: FloatArray
     robust: FloatArray
 
     @property
@@ -52,6 +54,7 @@ def joined(parts: Sequence[Rows]) -> Rows:
         gaps_mm=np.concatenate([part.gaps_mm for part in parts]),
         sigma_mm=np.concatenate([part.sigma_mm for part in parts]),
         point=np.concatenate([part.point for part in parts]),
+        worth=np.concatenate([part.worth for part in parts]),
         robust=np.concatenate([part.robust for part in parts]),
     )
 
