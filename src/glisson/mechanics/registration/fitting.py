@@ -9,7 +9,7 @@ from glisson.core.arrays import FloatArray
 from glisson.core.errors import StageFailed
 from glisson.core.status import Status
 from glisson.mechanics.registration.motion import Motion, MotionState
-from glisson.mechanics.registration.outliers import CUTS, judged
+from glisson.mechanics.registration.outliers import cuts, judged
 from glisson.mechanics.registration.rest import Rest
 from glisson.mechanics.registration.rows import Rows
 from glisson.mechanics.registration.seen import Seen
@@ -49,31 +49,37 @@ def fit(motion: Motion, seen: Seen, start: MotionState) -> Fit:
         StageFailed: it does not come to rest, or nothing holds the organ.
     """
     state = start
-    for cut in CUTS:
-        found = _descend(motion, seen, state, cut, Rest(_AT_REST if cut == CUTS[-1] else _NEARLY))
+    widths = cuts(seen.rows(motion.positions(start)), seen.count)
+    for cut in widths:
+        found = _descend(motion, seen, state, cut, Rest(_AT_REST if cut == widths[-1] else _NEARLY))
         state = found.state
     return found
 
 
 def _descend(motion: Motion, seen: Seen, state: MotionState, cut: float, rest: Rest) -> Fit:
-    damping = 1e-6
+    damping, growth = 1e-6, 2.0
     here = _at(motion, seen, state, cut)
     for _ in range(_ITERATIONS):
         matrix = here.data + here.prior
-        scale = np.diag(matrix) + 1e-9 * np.trace(matrix) / len(matrix)
+        scale = damping * (np.diag(matrix) + 1e-9 * np.trace(matrix) / len(matrix))
         try:
-            step = cho_solve(cho_factor(matrix + damping * np.diag(scale)), -here.gradient)
+            step = cho_solve(cho_factor(matrix + np.diag(scale)), -here.gradient)
         except LinAlgError:
-            damping = max(10.0 * damping, 1e-6)
+            damping, growth = damping * growth, 2.0 * growth
             continue
-        step *= min(1.0, _LONGEST_MM / max(_length(step), 1e-12))
-        there = _at(motion, seen, motion.moved(here.state, step), cut)
-        if there.cost < here.cost:
-            damping, here = max(damping / 5.0, 1e-9), there
+        share = min(1.0, _LONGEST_MM / max(_length(step), 1e-12))
+        there = _at(motion, seen, motion.moved(here.state, share * step), cut)
+        gained = here.cost - there.cost
+        if gained > 0.0:
+            # The damping falls by as much as the step kept its promise (Nielsen 1999).
+            promised = 0.5 * share * float(step @ (scale * step - here.gradient))
+            kept = min(gained / promised, 2.0)
+            damping, growth = max(damping * max(1.0 / 3.0, 1.0 - (2.0 * kept - 1.0) ** 3), 1e-9), 2.0
+            here = there
             if rest.reached(here.cost):
                 return here
         elif damping < _MOST_DAMPING:
-            damping *= 5.0
+            damping, growth = damping * growth, 2.0 * growth
         else:
             return here
     raise StageFailed("The organ does not come to rest on what was seen.", Status.ITERATION_LIMIT)

@@ -8,8 +8,8 @@ from glisson.core.arrays import FloatArray
 from glisson.mechanics.registration.rows import Rows
 
 _CUT = 3.0
-CUTS = (8.0 * _CUT, 4.0 * _CUT, 2.0 * _CUT, _CUT)
-"""Beyond so many standard deviations points count less and less, one fit after another: a far start finds its way."""
+_WIDEST = 20.0 * _CUT
+_NORMAL = 1.4826  # standard deviations of a normal distribution in a median of its absolute values
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,3 +31,14 @@ def judged(rows: Rows, count: int, cut: float) -> Judgement:
     worth[rows.point] = rows.worth
     cost = 0.5 * float(worth @ np.where(may_lie, squares * share, squares))
     return Judgement(beliefs, beliefs[rows.point] * rows.worth, cost)
+
+
+def cuts(rows: Rows, count: int) -> list[float]:
+    """So many standard deviations beyond which points count less and less, one fit after another.
+
+    The first is as wide as what was seen is off from the start, by its median, so that a far start finds its way and
+    points that lie are left aside from the beginning.
+    """
+    off = _NORMAL * float(np.sqrt(np.median(rows.squares(count))))
+    halvings = int(np.ceil(np.log2(np.clip(_CUT * off, _CUT, _WIDEST) / _CUT)))
+    return [_CUT * 2.0**halving for halving in range(halvings, -1, -1)]

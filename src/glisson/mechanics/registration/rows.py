@@ -39,7 +39,8 @@ class Rows:
 
     def squares(self, count: int) -> FloatArray:
         """Sum of the squares of the whitened gaps of each of `count` observed points."""
-        squares: FloatArray = np.bincount(self.point, self.residuals**2, minlength=count)
+        squares = np.zeros(count)
+        np.add.at(squares, self.point, self.residuals**2)
         return squares
 
 
