@@ -1,7 +1,7 @@
 """What was seen as scalar rows: each pulls one material point along one direction."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -31,6 +31,10 @@ class Rows:
     point: IntArray
     worth: FloatArray
     robust: FloatArray
+
+    def some(self, chosen: IntArray) -> "Rows":
+        """The rows of some numbers."""
+        return Rows(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
     @property
     def residuals(self) -> FloatArray:

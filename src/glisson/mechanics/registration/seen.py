@@ -1,6 +1,6 @@
 """What was seen, held against a model: which material point each seen point belongs to."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -14,6 +14,7 @@ from glisson.mechanics.registration.places import MaterialCurve, MaterialPoints,
 from glisson.mechanics.registration.rows import Rows, joined
 
 _TOUCHING_MM = 1e-6
+_ON_EDGE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -99,8 +100,26 @@ class SurfaceMatch:
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         touching = nearest.distance_mm < _TOUCHING_MM
         directions = np.where(touching[:, None], normals, arms)
-        directions /= np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-300)
-        return _along(directions, nearest.distance_mm, self._errors, nodes, nearest.barycentric, first, True)
+        pulls = _along(_unit(directions), nearest.distance_mm, self._errors, nodes, nearest.barycentric, first, True)
+        return joined([pulls, *self._held(pulls, corners, nearest.barycentric)])
+
+    def _held(self, pulls: Rows, corners: FloatArray, barycentric: FloatArray) -> list[Rows]:
+        """Rows without a gap: what is nearest to an edge or a corner stays so however the surface moves a little.
+
+        With them the matrix of a Gauss–Newton step has the true curvature of the squared distance.
+        """
+        inner = (barycentric > _ON_EDGE).sum(axis=1)
+        longest = np.argsort(barycentric, axis=1)
+        rows = np.arange(len(corners))
+        edge = corners[rows, longest[:, 2]] - corners[rows, longest[:, 1]]
+        across_edge = np.cross(edge, pulls.directions)
+        found = []
+        for chosen, axes in ((inner == 2, (across_edge,)), (inner == 1, _across(pulls.directions))):
+            found += [
+                replace(pulls, directions=_unit(axis), gaps_mm=np.zeros(len(axis))).some(np.flatnonzero(chosen))
+                for axis in axes
+            ]
+        return found
 
 
 class PointMatch:
@@ -176,11 +195,15 @@ def _along(
 
 def _across(along: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Two unit vectors (p, 3) across each of some directions (p, 3), and across each other."""
-    unit = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
+    unit = _unit(along)
     least = np.eye(3)[np.abs(unit).argmin(axis=1)]
-    one = np.cross(unit, least)
-    one /= np.linalg.norm(one, axis=1, keepdims=True)
+    one = _unit(np.cross(unit, least))
     return one, np.cross(unit, one)
+
+
+def _unit(vectors: FloatArray) -> FloatArray:
+    unit: FloatArray = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300)
+    return unit
 
 
 def _errors(item: Observation, model: ModelError) -> PointErrors:
