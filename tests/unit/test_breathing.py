@@ -73,6 +73,24 @@ def test_the_model_foretells_frames_that_it_has_not_seen():
     assert np.sqrt((off**2).mean()) < 0.5
 
 
+@pytest.mark.parametrize("marks", [1, 2, 5])
+def test_gaps_of_few_markers(marks):
+    """One of them is hidden at full inhalation in every breath; the others, where there are any, say where it is."""
+    breaths, times, truth = breathing(107, 45.0, marks=marks)
+    tracks = tracks_of(times, truth, 0.05)
+    states = np.array(tracks.states)
+    states[breaths.along(times) > 0.7, 0] = 2
+    hidden = replace(tracks, states=states)
+    cycles = find_cycles(hidden)
+    inside = np.isfinite(cycles.phase)
+    if marks > 1:
+        off = (cycles.phase - breaths.phase(times) + 0.5) % 1.0 - 0.5
+        assert np.abs(off[inside]).max() < 0.05
+        model = fit_breathing(hidden, cycles)
+        left = MM_PER_PX * np.linalg.norm(model.drift(times) + model.breathing(times) - truth, axis=2)[inside]
+        assert np.sqrt((left**2).mean(axis=0)).max() < 0.5
+
+
 def test_gated_frames_are_those_near_full_exhalation():
     breaths, times, truth = breathing(105)
     cycles = find_cycles(tracks_of(times, truth, 0.05))

@@ -31,7 +31,7 @@ def test_the_conclusion_has_the_distributions() -> None:
     ]
     done = dict(zip([point.key for point in points], outcomes, strict=False))
     values = study.conclude({}, done).values
-    assert values["times_as_fast"] == {"median": 4.0, "tail": pytest.approx(3.1), "worst": 3.0}
+    assert values["times_as_fast"] == {"median": 4.0, "p5": pytest.approx(3.1), "worst": 3.0}
     assert values["apart_mm"]["worst"] == 0.1
     assert values["estimate_off_by"]["median"] == pytest.approx(2.0)
     assert values["estimate_off_by"]["worst"] == pytest.approx(4.0)

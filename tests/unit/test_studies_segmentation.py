@@ -100,8 +100,8 @@ def test_the_conclusion_has_distributions_and_recall() -> None:
     done = dict(zip([point.key for point in points], outcomes, strict=False))
     conclusion = study.conclude({}, done)
     values = conclusion.values
-    assert values["scores"][0]["dice"] == {"median": 0.97, "tail": 0.97, "worst": 0.97}
-    assert values["scores"][1]["dice"] == {"median": 0.97, "tail": pytest.approx(0.952), "worst": 0.95}
+    assert values["scores"][0]["dice"] == {"median": 0.97, "p5": 0.97, "worst": 0.97}
+    assert values["scores"][1]["dice"] == {"median": 0.97, "p5": pytest.approx(0.952), "worst": 0.95}
     assert values["scores"][2]["dice"] is None
     leak, everything = values["flags"][0], values["flags"][-1]
     assert (leak["recall"], leak["noticed"], leak["good_flagged_share"]) == (0.375, 1, 0.1)

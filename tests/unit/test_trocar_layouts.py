@@ -113,7 +113,7 @@ def test_commands(hung, tmp_path, capfd):
     told = json.loads(capfd.readouterr().out)
     assert told["status"] == "converged"
     assert np.array(told["covariance"]).shape == (6, 6)
-    assert read_photograph(tmp_path / "seen.png").shape == (540, 640, 3)
+    assert read_photograph(tmp_path / "seen.png").shape == (544, 640, 3)
     write_photograph(tmp_path / "mirrored.png", images[0][:, ::-1])
     assert main(["localize", str(tmp_path / "mirrored.png"), *given]) == 2
     told = json.loads(capfd.readouterr().out)

@@ -58,6 +58,18 @@ def unit_vector(value: ArrayLike, what: str) -> FloatArray:
     return unit
 
 
+def frozen_covariance(value: ArrayLike, shape: Sequence[int | None], what: str) -> FloatArray:
+    """Like `frozen_floats` for covariances (..., k, k), which must be positive definite.
+
+    Raises:
+        BadInput: the shape differs, or one of them is not positive definite.
+    """
+    array = frozen_floats(value, shape, what)
+    if array.size and not (np.linalg.eigvalsh(array) > 0.0).all():
+        raise BadInput(f"{what[0].upper()}{what[1:]} must be positive definite.")
+    return array
+
+
 def check_range(indices: IntArray, count: int, what: str) -> None:
     """Raise BadInput when an index lies outside [0, count)."""
     if indices.size and (int(indices.min()) < 0 or int(indices.max()) >= count):

@@ -7,10 +7,8 @@ import numpy as np
 
 from glisson.core.arrays import FloatArray
 from glisson.core.errors import BadInput
+from glisson.core.marker_colours import MARKER_COLOURS
 from glisson.core.transform import RigidTransform
-
-COLOURS = ("red", "yellow", "green", "blue")
-"""Far apart in hue under any lamp, and each dark in one channel at least, where the paper is bright."""
 
 _ARM, _END = 1.0 / 6.0, 0.5
 _CORNERS = np.array(
@@ -41,13 +39,13 @@ class Cross:
     """
 
     name: str
-    colours: tuple[str, str, str, str, str]
+    colours: tuple[str, ...]
     size_mm: float
     room_from_cross: RigidTransform
 
     def __post_init__(self) -> None:
-        if len(self.colours) != 5 or not set(self.colours) <= set(COLOURS):
-            raise BadInput(f"The cross {self.name!r} needs five colours out of {', '.join(COLOURS)}.")
+        if len(self.colours) != 5 or not set(self.colours) <= set(MARKER_COLOURS):
+            raise BadInput(f"The cross {self.name!r} needs five colours out of {', '.join(MARKER_COLOURS)}.")
         if not (np.isfinite(self.size_mm) and self.size_mm > 0.0):
             raise BadInput(f"The cross {self.name!r} needs a positive size, not {self.size_mm} mm.")
         if (self.room_from_cross.target, self.room_from_cross.source) != ("room", "cross"):

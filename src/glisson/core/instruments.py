@@ -7,10 +7,8 @@ import numpy as np
 
 from glisson.core.arrays import FloatArray
 from glisson.core.errors import BadInput
+from glisson.core.marker_colours import MARKER_COLOURS
 from glisson.core.transform import RigidTransform
-
-WHEEL_COLOURS = ("red", "yellow", "green", "blue")
-"""Far apart in hue under any lamp, and each dark in one channel at least, where the paper is white."""
 
 SECTORS = 6
 
@@ -53,8 +51,8 @@ class Instrument:
     def __post_init__(self) -> None:
         if not self.name.strip():
             raise BadInput("An instrument needs a name.")
-        if len(self.colours) != SECTORS or not set(self.colours) <= set(WHEEL_COLOURS):
-            raise BadInput(f"The instrument {self.name!r} needs {SECTORS} colours out of {', '.join(WHEEL_COLOURS)}.")
+        if len(self.colours) != SECTORS or not set(self.colours) <= set(MARKER_COLOURS):
+            raise BadInput(f"The instrument {self.name!r} needs {SECTORS} colours out of {', '.join(MARKER_COLOURS)}.")
         for value, what in ((self.length_mm, "length"), (self.wheel_mm, "wheel")):
             if not (np.isfinite(value) and value > 0.0):
                 raise BadInput(f"The instrument {self.name!r} needs a {what} of more than 0 mm, not {value} mm.")

@@ -25,6 +25,7 @@ from glisson.core.localisation import Localisation
 from glisson.core.mesh import TetMesh, TriangleSurface
 from glisson.core.model import Material, Model
 from glisson.core.observations import Observations
+from glisson.core.registered import Registered
 from glisson.core.scenario import Scenario
 from glisson.core.status import Status
 from glisson.core.structures import VesselTree
@@ -206,8 +207,17 @@ class Solver(Technique, Protocol):
 class Registration(Technique, Protocol):
     """Deforms a model to fit what was seen (entry-point group `glisson.registrations`)."""
 
-    def register(self, model: Model, observations: Observations, progress: Progress = silent) -> Deformation:
-        """Deformation that explains the observations; unobservable or ambiguous is told by its status."""
+    def register(self, model: Model, observations: Observations, progress: Progress = silent) -> Registered:
+        """The model as the observations have it; what they do not determine is told by the status.
+
+        Args:
+            model: in its scanned shape.
+            observations: in the frame "patient", or in another of which nothing is known.
+            progress: told how far it is.
+
+        Raises:
+            BadInput: the observations cannot be of this model.
+        """
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glisson.core.arrays import FloatArray, frozen_floats
+from glisson.core.arrays import FloatArray, frozen_covariance, frozen_floats
 from glisson.core.errors import BadInput
 from glisson.core.transform import FRAMES, RigidTransform
 
@@ -28,9 +28,9 @@ class TipTrack:
         if (np.diff(times) <= 0.0).any():
             raise BadInput(f"The times of the track of {self.instrument!r} must grow.")
         points = frozen_floats(self.points_mm, (len(times), 3), f"tips of {self.instrument!r}")
-        covariance = frozen_floats(self.covariance_mm2, (len(times), 3, 3), f"tip covariance of {self.instrument!r}")
-        if len(times) and not (np.linalg.eigvalsh(covariance) > 0.0).all():
-            raise BadInput(f"The tips of {self.instrument!r} need positive definite covariances.")
+        covariance = frozen_covariance(
+            self.covariance_mm2, (len(times), 3, 3), f"the tip covariance of {self.instrument!r}"
+        )
         for name, value in (("times_s", times), ("points_mm", points), ("covariance_mm2", covariance)):
             object.__setattr__(self, name, value)
 

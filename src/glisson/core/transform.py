@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
 from glisson.core.arrays import FloatArray, frozen_floats
 from glisson.core.errors import BadInput
@@ -39,6 +40,11 @@ class RigidTransform:
         """Points (n, 3) or (3,) of the source frame, in the target frame."""
         result: FloatArray = np.asarray(points_mm, dtype=np.float64) @ self.rotation.T + self.translation_mm
         return result
+
+    def moved(self, step: FloatArray) -> "RigidTransform":
+        """The transform after a step (6,) of d and e; without covariance."""
+        turn = Rotation.from_rotvec(step[:3]).as_matrix()
+        return RigidTransform(self.target, self.source, turn @ self.rotation, self.translation_mm + step[3:])
 
     def inverse(self) -> "RigidTransform":
         """`source_from_target`, with its covariance to first order."""

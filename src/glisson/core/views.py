@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glisson.core.arrays import FloatArray, IntArray, check_range, frozen_floats, frozen_ints
+from glisson.core.arrays import FloatArray, IntArray, check_range, frozen_covariance, frozen_floats, frozen_ints
 from glisson.core.camera import Camera
 from glisson.core.errors import BadInput
 from glisson.core.transform import RigidTransform
@@ -30,8 +30,9 @@ class View:
         pose = self.room_from_camera
         if (pose.target, pose.source) != ("room", "camera"):
             raise BadInput(f"The pose of {self.name} is {pose.target}_from_{pose.source}; give room_from_camera.")
-        if pose.covariance is None or np.linalg.eigvalsh(pose.covariance).min() <= 0.0:
+        if pose.covariance is None:
             raise BadInput(f"The pose of {self.name} needs a positive definite covariance.")
+        frozen_covariance(pose.covariance, (6, 6), f"the covariance of the pose of {self.name}")
         object.__setattr__(self, "tip_px", frozen_floats(self.tip_px, (2,), f"tip in {self.name}"))
 
 
@@ -98,16 +99,12 @@ class ViewSet:
         if len(self.views) < 2:
             raise BadInput("A reconstruction needs at least two views.")
         object.__setattr__(self, "touched_mm", frozen_floats(self.touched_mm, (3,), "touched point"))
-        covariance = frozen_floats(self.touched_covariance_mm2, (3, 3), "covariance of the touched point")
-        if np.linalg.eigvalsh(covariance).min() <= 0.0:
-            raise BadInput("The covariance of the touched point must be positive definite.")
+        covariance = frozen_covariance(self.touched_covariance_mm2, (3, 3), "the covariance of the touched point")
         object.__setattr__(self, "touched_covariance_mm2", covariance)
         if not (np.isfinite(self.tip_sigma_px) and self.tip_sigma_px > 0.0):
             raise BadInput("The tip's pixels need a positive standard deviation.")
         if self.hand_eye_covariance is not None:
-            hand_eye = frozen_floats(self.hand_eye_covariance, (6, 6), "hand-eye covariance")
-            if np.linalg.eigvalsh(hand_eye).min() <= 0.0:
-                raise BadInput("The hand-eye covariance must be positive definite.")
+            hand_eye = frozen_covariance(self.hand_eye_covariance, (6, 6), "the hand-eye covariance")
             object.__setattr__(self, "hand_eye_covariance", hand_eye)
         if self.landmarks.count > len(self.names):
             raise BadInput(f"There are {self.landmarks.count} landmarks and {len(self.names)} names.")

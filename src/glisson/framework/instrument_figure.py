@@ -3,18 +3,17 @@
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from glisson.core.instruments import RINGS, SeenInstrument
 from glisson.core.trocar import Trocar
+from glisson.framework.camera_figure import on_image
 from glisson.intraoperative.cameras.projection import project
 from glisson.intraoperative.instruments.timeline import Use
 from glisson.navigation.figures.colours import BLACK, BLUE, SKY, VERMILLION
-from glisson.navigation.figures.picture import new_figure
+from glisson.navigation.figures.picture import new_figure, pixels_of
 
-_HEAD_PX = 64
 _OUTLINED = [withStroke(linewidth=3, foreground="white")]
 _DARKENED = [withStroke(linewidth=4, foreground="black")]
 _ROW_PX, _FOOT_PX = 44, 70
@@ -23,10 +22,15 @@ _ROW_PX, _FOOT_PX = 44, 70
 def draw_instrument(image: NDArray[np.uint8], trocar: Trocar, seen: SeenInstrument) -> NDArray[np.uint8]:
     """The image with the wheel's circles, where its sectors begin, the axis, and name, pose and tip in words."""
     camera = trocar.camera
-    figure = new_figure(camera.width, camera.height + _HEAD_PX)
-    axes = figure.add_axes((0.0, 0.0, 1.0, camera.height / (camera.height + _HEAD_PX)))
-    axes.imshow(image, interpolation="none", extent=(-0.5, camera.width - 0.5, camera.height - 0.5, -0.5))
-    axes.set_axis_off()
+    x, y, z = seen.tip_mm
+    sigma = float(np.sqrt(np.linalg.eigvalsh(seen.tip_covariance_mm2)[-1]))
+    figure, axes = on_image(
+        image,
+        camera,
+        f"{seen.instrument.name}: wheel {seen.distance_mm:.1f} mm away, {np.degrees(seen.angle_rad):.2f}° from the "
+        f"channel, tip ({x:.1f}, {y:.1f}, {z:.1f}) ± {sigma:.1f} mm",
+        "blue: the wheel as the pose predicts it; red: where its first sector begins; white: the axis towards the tip",
+    )
     pose, radius = seen.trocar_from_instrument, 0.5 * seen.instrument.wheel_mm
     angles = np.linspace(0.0, 2.0 * np.pi, 181)
     round_ = radius * np.stack([np.cos(angles), np.sin(angles), np.zeros(181)], axis=1)
@@ -39,16 +43,7 @@ def draw_instrument(image: NDArray[np.uint8], trocar: Trocar, seen: SeenInstrume
     u, v = project(camera, pose, [[0.0, -1.2 * radius, 0.0]])[0]
     u, v = np.clip(u, 10.0, camera.width - 200.0), np.clip(v, 20.0, camera.height - 20.0)
     axes.text(u, v, seen.instrument.name, fontsize=16, color=BLACK, path_effects=_OUTLINED)
-    axes.set(xlim=(-0.5, camera.width - 0.5), ylim=(camera.height - 0.5, -0.5))
-    x, y, z = seen.tip_mm
-    sigma = float(np.sqrt(np.linalg.eigvalsh(seen.tip_covariance_mm2)[-1]))
-    _write_head(
-        figure,
-        f"{seen.instrument.name}: wheel {seen.distance_mm:.1f} mm away, {np.degrees(seen.angle_rad):.2f}° from the "
-        f"channel, tip ({x:.1f}, {y:.1f}, {z:.1f}) ± {sigma:.1f} mm",
-        "blue: the wheel as the pose predicts it; red: where its first sector begins; white: the axis towards the tip",
-    )
-    return _pixels(figure)
+    return pixels_of(figure)
 
 
 def draw_timeline(found: Sequence[Use], end_s: float) -> NDArray[np.uint8]:
@@ -66,15 +61,4 @@ def draw_timeline(found: Sequence[Use], end_s: float) -> NDArray[np.uint8]:
     axes.grid(axis="x", alpha=0.3)
     if not names:
         axes.text(0.5, 0.5, "no instrument was recognised", transform=axes.transAxes, ha="center", fontsize=13)
-    return _pixels(figure)
-
-
-def _write_head(figure: Figure, first: str, second: str) -> None:
-    height = float(figure.get_size_inches()[1] * figure.dpi)
-    figure.text(0.01, 1.0 - 20 / height, first, fontsize=13, va="center")
-    figure.text(0.01, 1.0 - 46 / height, second, fontsize=11, va="center", color="0.3")
-
-
-def _pixels(figure: Figure) -> NDArray[np.uint8]:
-    figure.canvas.draw()
-    return np.asarray(figure.canvas.buffer_rgba(), dtype=np.uint8)[:, :, :3].copy()  # type: ignore[attr-defined]
+    return pixels_of(figure)

@@ -4,13 +4,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tomli_w
 
 from glisson.core import BadInput
 from glisson.core.camera import Camera
-from glisson.io.atomic import atomic_path
 from glisson.io.decoding import decoding
-from glisson.io.records import read_record
+from glisson.io.records import read_record, write_toml
 from glisson.io.tables import read_table
 
 SCHEMA = 1
@@ -51,8 +49,7 @@ def write_camera(path: str | Path, camera: Camera) -> None:
     }
     if camera.covariance is not None:
         table["covariance"] = camera.covariance.tolist()
-    with atomic_path(path) as temporary:
-        temporary.write_text(tomli_w.dumps(table), encoding="utf-8")
+    write_toml(path, table)
 
 
 def read_opencv_camera(intrinsics: str | Path, distortion: str | Path | None, width: int, height: int) -> Camera:

@@ -3,13 +3,10 @@
 from pathlib import Path
 from typing import Any
 
-import tomli_w
-
 from glisson.core.instruments import Instrument, InstrumentLibrary
 from glisson.core.trocar import Trocar
-from glisson.io.atomic import atomic_path
 from glisson.io.camera_files import read_camera
-from glisson.io.records import Record, read_record
+from glisson.io.records import Record, read_record, write_toml
 
 EXAMPLE_LIBRARY = Path(__file__).with_name("data") / "instruments.toml"
 """Ten instruments that come with Glisson."""
@@ -39,8 +36,7 @@ def write_instruments(path: str | Path, library: InstrumentLibrary) -> None:
         WriteFailed: the disk is full.
     """
     table = {"schema": _SCHEMA, "instruments": [_instrument_table(entry) for entry in library.instruments]}
-    with atomic_path(path) as temporary:
-        temporary.write_text(tomli_w.dumps(table), encoding="utf-8")
+    write_toml(path, table)
 
 
 def read_trocar(path: str | Path) -> Trocar:

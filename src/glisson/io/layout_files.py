@@ -4,14 +4,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tomli_w
 
 from glisson.core.arrays import FloatArray, unit_vector
 from glisson.core.crosses import Cross, CrossLayout
 from glisson.core.errors import BadInput
 from glisson.core.transform import RigidTransform
-from glisson.io.atomic import atomic_path
-from glisson.io.records import Record, read_record
+from glisson.io.records import Record, read_record, write_toml
 
 _SCHEMA = 1
 _UPRIGHT = 1e-3
@@ -36,8 +34,7 @@ def write_layout(path: str | Path, layout: CrossLayout) -> None:
         WriteFailed: the disk is full.
     """
     values = {"schema": _SCHEMA, "crosses": [_table(cross) for cross in layout.crosses]}
-    with atomic_path(path) as temporary:
-        temporary.write_text(tomli_w.dumps(values), encoding="utf-8")
+    write_toml(path, values)
 
 
 def _cross(record: Record) -> Cross:
@@ -45,7 +42,7 @@ def _cross(record: Record) -> Cross:
         covariance = record.floats("covariance", 6, 6) if record.has("covariance") else None
         rotation = _rotation(record.floats("right", 3), record.floats("down", 3))
         pose = RigidTransform("room", "cross", rotation, record.floats("centre_mm", 3), covariance)
-        return Cross(record.text("name"), record.texts("colours"), record.number("size_mm"), pose)  # type: ignore[arg-type]  # checked there
+        return Cross(record.text("name"), record.texts("colours"), record.number("size_mm"), pose)
 
 
 def _rotation(right: FloatArray, down: FloatArray) -> FloatArray:

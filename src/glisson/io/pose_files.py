@@ -5,14 +5,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tomli_w
 
 from glisson.core import BadInput
 from glisson.core.arrays import FloatArray
 from glisson.core.transform import RigidTransform
-from glisson.io.atomic import atomic_path
 from glisson.io.decoding import decoding
-from glisson.io.records import read_record
+from glisson.io.records import read_record, write_toml
 from glisson.io.tables import read_table
 
 SCHEMA = 1
@@ -91,8 +89,7 @@ def write_pose(path: str | Path, pose: RigidTransform) -> None:
     }
     if pose.covariance is not None:
         table["covariance"] = pose.covariance.tolist()
-    with atomic_path(path) as temporary:
-        temporary.write_text(tomli_w.dumps(table), encoding="utf-8")
+    write_toml(path, table)
 
 
 def _matrices(rows: list[list[float]]) -> list[FloatArray]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tomli_w
 
 from glisson.core import BadInput
 from glisson.core.arrays import FloatArray, IntArray
@@ -217,6 +218,17 @@ def write_json(path: Path, values: Mapping[str, Any]) -> None:
     """
     with atomic_path(path) as temporary:
         temporary.write_text(json_text(values), encoding="utf-8")
+
+
+def write_toml(path: str | Path, table: Mapping[str, Any]) -> None:
+    """Write a TOML file; atomic. Numbers keep all their digits.
+
+    Raises:
+        BadInput: the place cannot be written.
+        WriteFailed: the disk is full.
+    """
+    with atomic_path(path) as temporary:
+        temporary.write_text(tomli_w.dumps(table), encoding="utf-8")
 
 
 def json_text(values: Mapping[str, Any]) -> str:

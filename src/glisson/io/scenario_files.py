@@ -3,8 +3,6 @@
 from pathlib import Path
 from typing import Any, cast
 
-import tomli_w
-
 from glisson.core import (
     Board,
     ContactLaw,
@@ -20,8 +18,7 @@ from glisson.core import (
     TriangleSurface,
 )
 from glisson.core.arrays import FloatArray
-from glisson.io.atomic import atomic_path
-from glisson.io.records import Record, read_record
+from glisson.io.records import Record, read_record, write_toml
 
 SCHEMA = 1
 """Version of the layout of `scenario.toml` that is written; older ones are read."""
@@ -69,8 +66,7 @@ def write_scenario(path: str | Path, scenario: Scenario) -> None:
     table["cylinders"] = [_cylinder_table(tool) for tool in scenario.tools if isinstance(tool, Cylinder)]
     table["mesh_tools"] = [_mesh_tool_table(tool) for tool in scenario.tools if isinstance(tool, MeshTool)]
     table["stages"] = [_stage_table(stage) for stage in scenario.stages]
-    with atomic_path(path) as temporary:
-        temporary.write_text(tomli_w.dumps(table, multiline_strings=False), encoding="utf-8")
+    write_toml(path, table)
 
 
 def _direction(record: Record, key: str) -> FloatArray | None:

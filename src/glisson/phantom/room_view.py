@@ -54,9 +54,8 @@ class RoomViews:
             if window is not None:
                 plane = np.array([patch.centre_mm, patch.right, patch.down])
                 sizes = np.array([*patch.half_mm, patch.cross_mm])
-                seed = int(rng.integers(2**31))
                 own = (window, rotation, centre, plane, sizes, patch.colours)
-                _add_patch(light, self._slopes, *own, scene.rods, near_rods, *lit, scene.glare, seed)
+                _add_patch(light, self._slopes, *own, scene.rods, near_rods, *lit, scene.glare, rng)
         return light
 
     def visible(self, scene: Scene, cross: Cross, room_from_camera: RigidTransform) -> bool:
@@ -178,13 +177,12 @@ def _room_light(
 def _add_patch(
     light: FloatArray, slopes: FloatArray, window: NDArray[np.int64], rotation: FloatArray, centre: FloatArray,
     plane: FloatArray, sizes: FloatArray, colours: FloatArray, rods: FloatArray, near_rods: NDArray[np.uint8],
-    gradient: FloatArray, tint: FloatArray, glare: FloatArray, seed: int,
+    gradient: FloatArray, tint: FloatArray, glare: FloatArray, rng: np.random.Generator,
 ) -> None:  # fmt: skip
     """Put a sheet into the picture; rays are spread at random within a pixel's 16 parts, which has no bias.
 
     `near_rods` is 1 where a rod may be seen.
     """
-    np.random.seed(seed)  # noqa: NPY002 - numba has no generators that are seeded inside
     height, width = slopes.shape[:2]
     # The ray (x, y, 1) of the camera in the frame of the sheet: across, along and towards it.
     frame = np.zeros((3, 3))
@@ -219,8 +217,8 @@ def _add_patch(
             for part in range(rays):
                 u, v = 0.0, 0.0
                 if not alone:
-                    u = (part % _SAMPLES + np.random.random()) / _SAMPLES - 0.5  # noqa: NPY002
-                    v = (part // _SAMPLES + np.random.random()) / _SAMPLES - 0.5  # noqa: NPY002
+                    u = (part % _SAMPLES + rng.random()) / _SAMPLES - 0.5
+                    v = (part // _SAMPLES + rng.random()) / _SAMPLES - 0.5
                 x, y = slopes[row, column, 0] + u * xu + v * xv, slopes[row, column, 1] + u * yu + v * yv
                 reach = -from_middle[2] / max(turned[2, 0] * x + turned[2, 1] * y + turned[2, 2], 1e-9)
                 across = from_middle[0] + reach * (turned[0, 0] * x + turned[0, 1] * y + turned[0, 2])

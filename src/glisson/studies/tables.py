@@ -19,12 +19,12 @@ def as_csv(rows: Sequence[Mapping[str, Any]], leave_out: Collection[str] = ()) -
 
 
 def distribution(values: Sequence[float], low: bool = False) -> dict[str, float] | None:
-    """Median, 95th percentile (`tail`) and worst of values; 5th and least where `low` ones are the bad ones."""
+    """`median`, `p95` and `worst` of values; `p5` and the least where `low` ones are the bad ones."""
     if not values:
         return None
     percentile, worst = (5, min(values)) if low else (95, max(values))
     return {
         "median": float(np.median(values)),
-        "tail": float(np.percentile(values, percentile)),
+        f"p{percentile}": float(np.percentile(values, percentile)),
         "worst": float(worst),
     }

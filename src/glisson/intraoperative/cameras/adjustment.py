@@ -6,15 +6,16 @@ from typing import Generic, TypeVar
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
-from scipy.spatial.transform import Rotation
 
 from glisson.core.arrays import FloatArray
-from glisson.core.transform import RigidTransform
+from glisson.core.errors import StageFailed
+from glisson.core.status import Status
 
 State = TypeVar("State")
 
-_ITERATIONS = 100
-_LEAST_GAIN = 1e-12
+_ITERATIONS = 300
+_LEAST_GAIN = 1e-10
+_MOST_DAMPING = 1e8
 _SINGULAR = 1e-13
 
 
@@ -44,38 +45,37 @@ def minimum(
         start: where to begin.
         equations_at: the normal equations at a state; an infinite cost where a state is impossible.
         moved: a state moved by a step (n,).
+
+    Raises:
+        StageFailed: it does not come to rest.
     """
-    state, here, damping = start, equations_at(start), 1e-4
+    state, here, damping, growth = start, equations_at(start), 1e-4, 2.0
     for _ in range(_ITERATIONS):
         scale = np.diag(here.matrix) + 1e-12 * np.trace(here.matrix)
         try:
             step = cho_solve(cho_factor(here.matrix + damping * np.diag(scale)), -here.gradient)
         except LinAlgError:
-            damping *= 10.0
+            damping, growth = damping * growth, 2.0 * growth
             continue
         tried = moved(state, step)
         there = equations_at(tried)
         if there.cost < here.cost:
             gain = here.cost - there.cost
-            state, here, damping = tried, there, max(damping * 0.1, 1e-12)
-            if gain < _LEAST_GAIN * here.cost:
-                break
-        elif damping > 1e8:
-            break
+            promised = 0.5 * float(step @ (damping * scale * step - here.gradient))
+            # The damping falls by as much as the equations kept their promise (Nielsen 1999).
+            damping, growth = damping * max(1.0 / 3.0, 1.0 - (2.0 * gain / promised - 1.0) ** 3), 2.0
+            settled = gain < _LEAST_GAIN * here.cost
+            state, here = tried, there
+            if settled:
+                return Minimum(state, here)
+        elif damping > _MOST_DAMPING:
+            return Minimum(state, here)  # no step is short enough to gain anything
         else:
-            damping *= 10.0
-    return Minimum(state, here)
-
-
-def moved_pose(pose: RigidTransform, step: FloatArray) -> RigidTransform:
-    """A pose moved by d and e (6,), see `RigidTransform`; without covariance."""
-    turn = Rotation.from_rotvec(step[:3]).as_matrix()
-    return RigidTransform(pose.target, pose.source, turn @ pose.rotation, pose.translation_mm + step[3:])
-
-
-def with_covariance(pose: RigidTransform, covariance: FloatArray) -> RigidTransform:
-    """The same pose with a covariance (6, 6)."""
-    return RigidTransform(pose.target, pose.source, pose.rotation, pose.translation_mm, covariance)
+            damping, growth = damping * growth, 2.0 * growth
+    raise StageFailed(
+        "Poses and points could not be brought together; check what was given, or take more views.",
+        Status.ITERATION_LIMIT,
+    )
 
 
 def inverse(matrix: FloatArray) -> FloatArray | None:

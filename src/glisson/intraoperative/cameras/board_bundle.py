@@ -9,7 +9,7 @@ from glisson.core.arrays import FloatArray
 from glisson.core.camera import Camera
 from glisson.core.errors import BadInput
 from glisson.core.transform import RigidTransform
-from glisson.intraoperative.cameras.adjustment import Minimum, NormalEquations, minimum, moved_pose
+from glisson.intraoperative.cameras.adjustment import Minimum, NormalEquations, minimum
 from glisson.intraoperative.cameras.projection import project, project_with_jacobian
 
 INTRINSIC = 4
@@ -54,7 +54,7 @@ class Bundle:
         except BadInput:
             return self
         steps = step[len(free) :].reshape(-1, 6)
-        poses = tuple(moved_pose(pose, one) for pose, one in zip(self.poses, steps, strict=True))
+        poses = tuple(pose.moved(one) for pose, one in zip(self.poses, steps, strict=True))
         return Bundle(camera, poses, self.terms)
 
 

@@ -10,7 +10,7 @@ from glisson.core.camera import Camera
 from glisson.core.errors import StageFailed
 from glisson.core.status import Status
 from glisson.core.transform import RigidTransform
-from glisson.intraoperative.cameras.adjustment import NormalEquations, inverse, minimum, moved_pose
+from glisson.intraoperative.cameras.adjustment import NormalEquations, inverse, minimum
 from glisson.intraoperative.cameras.boards import BoardView
 from glisson.intraoperative.cameras.projection import project_with_jacobian, undistorted
 
@@ -86,7 +86,7 @@ def _refined(camera: Camera, view: BoardView, start: RigidTransform) -> BoardPos
         by_pose = jacobian[:, :, :6].reshape(-1, 6)
         return NormalEquations(0.5 * float(off @ off), by_pose.T @ off, by_pose.T @ by_pose)
 
-    found = minimum(start, equations, moved_pose)
+    found = minimum(start, equations, RigidTransform.moved)
     cofactor = inverse(found.equations.matrix)
     if cofactor is None:
         raise StageFailed(f"{view.name}: the points do not determine the board's pose.", Status.UNOBSERVABLE)

@@ -9,6 +9,11 @@ from glisson.core.arrays import FloatArray, frozen_floats
 from glisson.core.errors import BadInput
 
 BoardKind = Literal["chessboard", "dots", "asymmetric-dots", "charuco"]
+_PLAIN_KINDS: dict[str, BoardKind] = {
+    "chessboard": "chessboard",
+    "dots": "dots",
+    "asymmetric-dots": "asymmetric-dots",
+}
 
 _FORMS = (
     "chessboard:9x6:5 (inner corners, square in mm), dots:14x16:4, asymmetric-dots:4x11:5 (dots, spacing in mm) "
@@ -72,15 +77,15 @@ def board_from_text(text: str) -> Board:
     """
     kind, _, rest = text.partition(":")
     size, *numbers = rest.split(":")
-    wanted = {"chessboard": 1, "dots": 1, "asymmetric-dots": 1, "charuco": 3}.get(kind)
+    wanted = 3 if kind == "charuco" else 1
     try:
         if wanted != len(numbers):
             raise ValueError
         columns, rows = (int(number) for number in size.split("x"))
         if kind == "charuco":
             return Board("charuco", columns, rows, float(numbers[0]), float(numbers[1]), numbers[2].upper())
-        return Board(kind, columns, rows, float(numbers[0]))  # type: ignore[arg-type]  # one of the keys above
-    except ValueError:
+        return Board(_PLAIN_KINDS[kind], columns, rows, float(numbers[0]))
+    except (KeyError, ValueError):
         raise BadInput(f"A board is written {_FORMS}, not {text!r}.") from None
 
 

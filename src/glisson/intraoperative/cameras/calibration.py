@@ -1,7 +1,7 @@
 """Focal lengths, principal point and distortion of a camera from views of a flat board."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -12,7 +12,7 @@ from glisson.core.camera import Camera
 from glisson.core.errors import BadInput, StageFailed
 from glisson.core.status import Status
 from glisson.core.transform import RigidTransform
-from glisson.intraoperative.cameras.adjustment import inverse, with_covariance
+from glisson.intraoperative.cameras.adjustment import inverse
 from glisson.intraoperative.cameras.board_bundle import INTRINSIC, Bundle, Seen, adjusted_bundle
 from glisson.intraoperative.cameras.board_pose import board_poses
 from glisson.intraoperative.cameras.boards import BoardView
@@ -200,7 +200,7 @@ def _told(
     squares = [(rows[keep] ** 2).sum(axis=1) for rows, keep in zip(residuals, used, strict=True)]
     return CameraCalibration(
         camera,
-        tuple(with_covariance(p, together[block, block]) for p, block in zip(bundle.poses, blocks, strict=True)),
+        tuple(replace(p, covariance=together[block, block]) for p, block in zip(bundle.poses, blocks, strict=True)),
         tuple(NAMES[index - INTRINSIC] for index in free if index >= INTRINSIC),
         tuple(residuals),
         tuple(used),

@@ -11,7 +11,6 @@ from glisson.core.camera import Camera
 from glisson.core.errors import BadInput, StageFailed
 from glisson.core.status import Status
 from glisson.core.transform import RigidTransform
-from glisson.intraoperative.cameras.adjustment import moved_pose, with_covariance
 from glisson.intraoperative.cameras.board_pose import BoardPose, board_pose
 from glisson.intraoperative.cameras.hand_eye_closed_form import hand_eye_closed_form
 from glisson.intraoperative.cameras.hand_eye_equations import (
@@ -93,12 +92,12 @@ def calibrate_hand_eye(camera: Camera, views: Sequence[HandEyeView]) -> HandEye:
             sizes = blocks.sizes(starts)
             starts = sizes[None]
         step, normal = blocks.solved(sizes)
-        poses = (moved_pose(poses[0], step[:6]), moved_pose(poses[1], step[6:12]))
+        poses = poses[0].moved(step[:6]), poses[1].moved(step[6:12])
     covariance = blocks.covariance(normal)
     corrected = moved_camera(camera, steps @ step[12:])
     if camera.covariance is not None:
         corrected = replace(corrected, covariance=steps @ covariance[12:, 12:] @ steps.T)
-    poses = with_covariance(poses[0], covariance[:6, :6]), with_covariance(poses[1], covariance[6:12, 6:12])
+    poses = replace(poses[0], covariance=covariance[:6, :6]), replace(poses[1], covariance=covariance[6:12, 6:12])
     sigmas = sigma_px, float(sizes[2]), float(np.degrees(sizes[0])), float(sizes[1])
     return _told(corrected, views, poses, sigmas)
 

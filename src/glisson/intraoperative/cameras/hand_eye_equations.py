@@ -1,7 +1,7 @@
 """What tracked views of a board say of the hand–eye pose and of the board's place: A = X B Z, linearised."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -9,7 +9,6 @@ from scipy.spatial.transform import Rotation
 from glisson.core.arrays import FloatArray
 from glisson.core.camera import Camera
 from glisson.core.transform import RigidTransform, cross_matrix
-from glisson.intraoperative.cameras.adjustment import with_covariance
 from glisson.intraoperative.cameras.board_pose import BoardPose
 from glisson.intraoperative.cameras.boards import BoardView
 from glisson.intraoperative.cameras.variance_components import Blocks
@@ -65,7 +64,7 @@ def linearised(
         Blocks of turn and shift (n, 6); the parts are the tracker's errors in angle (1 rad) and in place (1 mm), and an
         error that the points of a board share, as if each were found to 1 px only.
     """
-    camera_from_marker, base_from_board = (with_covariance(pose, np.zeros((6, 6))) for pose in poses)
+    camera_from_marker, base_from_board = (replace(pose, covariance=np.zeros((6, 6))) for pose in poses)
     residuals, jacobians, parts = [], [], []
     for board, view in zip(boards, views, strict=True):
         through = [

@@ -7,7 +7,8 @@ from itertools import product
 import numpy as np
 
 from glisson.core.errors import BadInput, StageFailed
-from glisson.core.instruments import SECTORS, WHEEL_COLOURS, Instrument, InstrumentLibrary
+from glisson.core.instruments import SECTORS, Instrument, InstrumentLibrary
+from glisson.core.marker_colours import MARKER_COLOURS
 from glisson.core.status import Status
 
 LEAST_APART = 2
@@ -55,18 +56,18 @@ def free_code(library: InstrumentLibrary) -> tuple[str, ...]:
     Raises:
         BadInput: no code is left that can be told from all others.
     """
-    codes = np.array(list(product(range(len(WHEEL_COLOURS)), repeat=SECTORS)))
+    codes = np.array(list(product(range(len(MARKER_COLOURS)), repeat=SECTORS)))
     turns = range(SECTORS)
     ways = [np.roll(codes[:, ::step], turn, axis=1) for step in (1, -1) for turn in turns]
     own = np.min([(codes != way).sum(axis=1) for way in ways[1:]], axis=0)
     others = np.full(len(codes), SECTORS)
     for one in library.instruments:
-        numbers = np.array([WHEEL_COLOURS.index(colour) for colour in one.colours])
+        numbers = np.array([MARKER_COLOURS.index(colour) for colour in one.colours])
         others = np.minimum(others, np.min([(way != numbers).sum(axis=1) for way in ways], axis=0))
     best = int(np.argmax(np.where(own >= LEAST_APART, others, -1)))
     if own[best] < LEAST_APART or others[best] < LEAST_APART:
         raise BadInput("No colour code is left that can be told from all others in the library.")
-    return tuple(WHEEL_COLOURS[number] for number in codes[best])
+    return tuple(MARKER_COLOURS[number] for number in codes[best])
 
 
 def instrument_of(reading: Reading, library: InstrumentLibrary) -> tuple[Instrument, int]:

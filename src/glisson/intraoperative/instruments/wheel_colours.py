@@ -6,7 +6,8 @@ from numpy.typing import NDArray
 
 from glisson.core.arrays import FloatArray
 from glisson.core.camera import Camera
-from glisson.core.instruments import RINGS, SECTORS, WHEEL_COLOURS
+from glisson.core.instruments import RINGS, SECTORS
+from glisson.core.marker_colours import MARKER_COLOURS
 from glisson.core.transform import RigidTransform
 from glisson.intraoperative.cameras.projection import project
 
@@ -41,16 +42,16 @@ def read_sectors(
         radius_mm: the wheel's radius.
     """
     labels = _labels(image, camera, trocar_from_wheel, radius_mm)
-    one_hot = np.stack([labels == number for number in range(len(WHEEL_COLOURS))]).sum(axis=1)
+    one_hot = np.stack([labels == number for number in range(len(MARKER_COLOURS))]).sum(axis=1)
     wide = _DEGREES // SECTORS
     best, begin = -1, 0
     for shift in range(wide):
-        counts = np.roll(one_hot, -shift, axis=1).reshape(len(WHEEL_COLOURS), SECTORS, wide).sum(axis=2)
+        counts = np.roll(one_hot, -shift, axis=1).reshape(len(MARKER_COLOURS), SECTORS, wide).sum(axis=2)
         # Squares, so that a boundary off its place costs more than what is gained beside it.
         agreeing = int((counts.max(axis=0) ** 2).sum())
         if agreeing > best:
             best, begin = agreeing, shift
-    counts = np.roll(one_hot, -begin, axis=1).reshape(len(WHEEL_COLOURS), SECTORS, wide).sum(axis=2)
+    counts = np.roll(one_hot, -begin, axis=1).reshape(len(MARKER_COLOURS), SECTORS, wide).sum(axis=2)
     return tuple(_colour(counts[:, sector], wide * _RADII) for sector in range(SECTORS)), float(np.radians(begin))
 
 
@@ -68,7 +69,7 @@ def _colour(counts: NDArray[np.intp], all_of_it: int) -> str | None:
     readable, most = counts.sum(), counts.max()
     if readable < _READABLE * all_of_it or most < _SURE * readable:
         return None
-    return WHEEL_COLOURS[int(counts.argmax())]
+    return MARKER_COLOURS[int(counts.argmax())]
 
 
 def _labels(image: NDArray[np.uint8], camera: Camera, pose: RigidTransform, radius_mm: float) -> NDArray[np.int_]:

@@ -1,7 +1,7 @@
 """The pose of a wheel from its rims, and what the trocar's pivot says to it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from glisson.core.arrays import FloatArray
 from glisson.core.camera import Camera
 from glisson.core.errors import StageFailed
 from glisson.core.status import Status
-from glisson.core.transform import RigidTransform, cross_matrix
+from glisson.core.transform import RigidTransform
 from glisson.core.trocar import Trocar
 from glisson.intraoperative.cameras.projection import project_with_jacobian
 from glisson.intraoperative.instruments.rim_edges import ANGLES, RimEdges
@@ -78,7 +78,7 @@ def fitted_pose(
             raise StageFailed("Too little of the wheel's rims can be seen.", Status.UNOBSERVABLE)
         system = _System.of(camera, pose, growth, radius_mm, edges, trocar)
         change = np.asarray(np.linalg.solve(system.information, system.pull), dtype=np.float64)
-        pose, growth = moved(pose, change[:6]), growth + float(change[6])
+        pose, growth = pose.moved(change[:6]), growth + float(change[6])
         if step >= len(_WINDOWS) and np.abs(change).max() < 1e-5:
             break
     inverse = np.asarray(np.linalg.inv(system.information), dtype=np.float64)
@@ -86,8 +86,7 @@ def fitted_pose(
     if camera.covariance is not None:
         by_camera = (inverse @ system.by_camera)[:6]
         covariance = covariance + by_camera @ camera.covariance @ by_camera.T
-    known = RigidTransform(pose.target, pose.source, pose.rotation, pose.translation_mm, covariance)
-    return WheelPose(known, edges, system.noise_px)
+    return WheelPose(replace(pose, covariance=covariance), edges, system.noise_px)
 
 
 def past_pivot(pose: RigidTransform, trocar: Trocar) -> tuple[FloatArray, FloatArray]:
@@ -104,16 +103,6 @@ def disagreement(found: WheelPose, trocar: Trocar) -> float:
     assert found.pose.covariance is not None
     spread = jacobian @ found.pose.covariance @ jacobian.T + trocar.play_mm**2 * np.eye(2)
     return float(off @ np.linalg.solve(spread, off))
-
-
-def moved(pose: RigidTransform, change: FloatArray) -> RigidTransform:
-    """A pose after a small turn d and shift e (6,)."""
-    angle = float(np.linalg.norm(change[:3]))
-    turn = np.eye(3)
-    if angle > 0.0:
-        k = cross_matrix(change[:3] / angle)
-        turn = np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * k @ k
-    return RigidTransform(pose.target, pose.source, turn @ pose.rotation, pose.translation_mm + change[3:])
 
 
 @dataclass(frozen=True, eq=False)

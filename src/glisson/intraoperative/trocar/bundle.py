@@ -7,16 +7,14 @@ import numpy as np
 
 from glisson.core.arrays import FloatArray
 from glisson.core.camera import Camera
-from glisson.core.crosses import COLOURS, CrossLayout, unit_corners
-from glisson.core.errors import StageFailed
-from glisson.core.status import Status
+from glisson.core.crosses import CrossLayout, unit_corners
+from glisson.core.marker_colours import MARKER_COLOURS
 from glisson.core.transform import RigidTransform, cross_matrix
+from glisson.intraoperative.cameras.adjustment import Minimum, NormalEquations, minimum
 from glisson.intraoperative.cameras.projection import project_with_jacobian
 from glisson.intraoperative.trocar.corners import SeenCorners
 from glisson.intraoperative.trocar.growth import LIKELY_GROWTH_PX
-from glisson.intraoperative.trocar.refinement import turn
 
-_ITERATIONS = 60
 _ROBUST = 3.0
 """Corners that err by more standard deviations weigh less (Huber)."""
 
@@ -33,7 +31,7 @@ class Bundle:
     poses: Sequence[RigidTransform]
     places: Sequence[RigidTransform]
     size_factor: float = 1.0
-    growth_px: FloatArray = field(default_factory=lambda: np.zeros(len(COLOURS)))
+    growth_px: FloatArray = field(default_factory=lambda: np.zeros(len(MARKER_COLOURS)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,27 +53,15 @@ def adjusted(
         StageFailed: it does not converge.
     """
     known = (first, second, length_mm, sigma_mm)
-    damping = 1e-4
-    cost, normal, gradient, _ = _equations(bundle, camera, layout, known)
-    for _ in range(_ITERATIONS):
-        step = np.asarray(np.linalg.solve(normal + damping * np.diag(np.diag(normal)), -gradient), dtype=np.float64)
-        tried = _moved(bundle, step)
-        its_cost, its_normal, its_gradient, _ = _equations(tried, camera, layout, known)
-        if its_cost > cost:
-            damping *= 10.0
-            continue
-        gain, bundle, cost, normal, gradient = cost - its_cost, tried, its_cost, its_normal, its_gradient
-        damping = max(0.1 * damping, 1e-12)
-        if gain < 1e-8 * (1.0 + cost):
-            return _told(bundle, camera, layout, known)
-    raise StageFailed("The survey of the crosses does not converge; take more images.", Status.ITERATION_LIMIT)
+    found = minimum(bundle, lambda state: _equations(state, camera, layout, known)[0], _moved)
+    return _told(found, camera, layout, _equations(found.state, camera, layout, known)[1])
 
 
-def _told(bundle: Bundle, camera: Camera, layout: CrossLayout, known: tuple[int, int, float, float]) -> Adjusted:
-    cost, normal, _, errors = _equations(bundle, camera, layout, known)
-    freedom = max(2 * len(errors) + 1 - len(normal), 1)
-    covariance = np.linalg.inv(normal) * max(1.0, cost / freedom)
-    size_sigma = float(np.sqrt(covariance[-1 - len(COLOURS), -1 - len(COLOURS)]))
+def _told(found: Minimum[Bundle], camera: Camera, layout: CrossLayout, errors: FloatArray) -> Adjusted:
+    bundle, equations = found.state, found.equations
+    freedom = max(2 * len(errors) + 1 - len(equations.gradient), 1)
+    covariance = np.linalg.inv(equations.matrix) * max(1.0, 2.0 * equations.cost / freedom)
+    size_sigma = float(np.sqrt(covariance[-1 - len(MARKER_COLOURS), -1 - len(MARKER_COLOURS)]))
     count = len(bundle.places)
     of_places = np.zeros((6 * count, 6 * count))
     of_places[6:, 6:] = covariance[: 6 * count - 6, : 6 * count - 6]
@@ -124,22 +110,20 @@ def in_frame_of(
 def _moved(bundle: Bundle, step: FloatArray) -> Bundle:
     """The bundle after a step."""
     crosses = 6 * (len(bundle.places) - 1)
-    places = [_stepped(place, step[6 * n : 6 * n + 6]) for n, place in enumerate(bundle.places[1:])]
-    poses = [_stepped(pose, step[crosses + 6 * v : crosses + 6 * v + 6]) for v, pose in enumerate(bundle.poses)]
-    factor = bundle.size_factor + float(step[-1 - len(COLOURS)])
-    return Bundle(bundle.views, poses, [bundle.places[0], *places], factor, bundle.growth_px + step[-len(COLOURS) :])
-
-
-def _stepped(pose: RigidTransform, step: FloatArray) -> RigidTransform:
-    return RigidTransform(pose.target, pose.source, turn(step[:3]) @ pose.rotation, pose.translation_mm + step[3:])
+    places = [place.moved(step[6 * n : 6 * n + 6]) for n, place in enumerate(bundle.places[1:])]
+    poses = [pose.moved(step[crosses + 6 * v : crosses + 6 * v + 6]) for v, pose in enumerate(bundle.poses)]
+    factor = bundle.size_factor + float(step[-1 - len(MARKER_COLOURS)])
+    return Bundle(
+        bundle.views, poses, [bundle.places[0], *places], factor, bundle.growth_px + step[-len(MARKER_COLOURS) :]
+    )
 
 
 def _equations(
     bundle: Bundle, camera: Camera, layout: CrossLayout, known: tuple[int, int, float, float]
-) -> tuple[float, FloatArray, FloatArray, FloatArray]:
-    """Robust squared error, normal matrix and gradient over all unknowns, and the errors (n, 2) of the slopes."""
+) -> tuple[NormalEquations, FloatArray]:
+    """The normal equations of the robust squared error over all unknowns, and the errors (n, 2) of the slopes."""
     crosses = 6 * (len(bundle.places) - 1)
-    size = crosses + 6 * len(bundle.poses) + 1 + len(COLOURS)
+    size = crosses + 6 * len(bundle.poses) + 1 + len(MARKER_COLOURS)
     normal, gradient, cost = np.zeros((size, size)), np.zeros(size), 0.0
     errors = []
     slopes_of = Camera(camera.width, camera.height, np.ones(2), np.zeros(2))
@@ -151,7 +135,7 @@ def _equations(
             turned = np.column_stack([flat, np.zeros(len(flat))]) @ place.rotation.T
             arms = turned * bundle.size_factor
             seen, by_all = project_with_jacobian(slopes_of, pose, arms + place.translation_mm)
-            growth = np.zeros((len(flat), 2, len(COLOURS))) if view.growth is None else view.growth[rows]
+            growth = np.zeros((len(flat), 2, len(MARKER_COLOURS))) if view.growth is None else view.growth[rows]
             off = seen + growth @ bundle.growth_px - view.slopes[rows]
             by_point = by_all[:, :, 3:6] @ pose.rotation
             columns = [crosses + 6 * v + k for k in range(6)]
@@ -159,7 +143,7 @@ def _equations(
             if number > 0:
                 columns += [6 * (number - 1) + k for k in range(6)]
                 jacobian += [by_point @ -np.array([cross_matrix(arm) for arm in arms]), by_point]
-            columns += range(size - 1 - len(COLOURS), size)
+            columns += range(size - 1 - len(MARKER_COLOURS), size)
             jacobian += [by_point @ turned[:, :, None], growth]
             by_unknowns = np.concatenate(jacobian, axis=2)
             information = view.information[rows]
@@ -172,11 +156,11 @@ def _equations(
             gradient[columns] += np.einsum("nik,ni->k", weighted, off)
             errors.append(off)
     cost += _add_distance(bundle, known, normal, gradient)
-    last = slice(size - len(COLOURS), size)
-    normal[last, last] += np.eye(len(COLOURS)) / LIKELY_GROWTH_PX**2
+    last = slice(size - len(MARKER_COLOURS), size)
+    normal[last, last] += np.eye(len(MARKER_COLOURS)) / LIKELY_GROWTH_PX**2
     gradient[last] += bundle.growth_px / LIKELY_GROWTH_PX**2
     cost += float(np.sum((bundle.growth_px / LIKELY_GROWTH_PX) ** 2))
-    return cost, normal, gradient, np.concatenate(errors)
+    return NormalEquations(0.5 * cost, gradient, normal), np.concatenate(errors)
 
 
 def _add_distance(

@@ -3,7 +3,8 @@
 from functools import cache
 from itertools import product
 
-from glisson.core.crosses import COLOURS, readings
+from glisson.core.crosses import readings
+from glisson.core.marker_colours import MARKER_COLOURS
 
 Code = tuple[str, str, str, str, str]
 
@@ -15,7 +16,7 @@ def cross_codes() -> tuple[Code, ...]:
     They do so turned and mirrored, and each from itself turned or mirrored: one square misread makes no other cross.
     """
     chosen: list[Code] = []
-    for code in product(COLOURS, repeat=5):
+    for code in product(MARKER_COLOURS, repeat=5):
         turned, mirrored = readings(code), readings(code, mirrored=True)
         own = min(_difference(code, other) for other in [*turned[1:], *mirrored])
         if own >= 2 and all(_difference(other, view) >= 2 for other in chosen for view in [*turned, *mirrored]):

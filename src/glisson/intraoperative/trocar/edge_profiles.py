@@ -35,7 +35,7 @@ def edge_offsets(
         image: [row, column, red green blue].
         pixels: where edges are expected (n, 2).
         normals: unit vectors (n, 2) from ink to paper.
-        colours: numbers of the inks in `COLOURS` (n,).
+        colours: numbers of the inks in `MARKER_COLOURS` (n,).
         reach_px: how far to look on either side.
     """
     count = int(2.0 * reach_px / _STEP_PX) + 1

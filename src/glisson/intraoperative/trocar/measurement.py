@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from glisson.core.arrays import FloatArray
 from glisson.core.camera import Camera
-from glisson.core.crosses import COLOURS, Cross, CrossLayout
+from glisson.core.crosses import Cross, CrossLayout
+from glisson.core.marker_colours import MARKER_COLOURS
 from glisson.core.transform import RigidTransform
 from glisson.intraoperative.cameras.projection import project, undistorted
 from glisson.intraoperative.trocar.corners import SeenCorners
@@ -68,9 +69,9 @@ def measure_corners(
                 continue
             normals = lines.normals[edges]
             weights = 1.0 / np.array([lines.variances[edges[0], 1], lines.variances[edges[1], 0]])
-            grown = np.zeros((2, len(COLOURS)))
+            grown = np.zeros((2, len(MARKER_COLOURS)))
             for row, edge in enumerate(edges):
-                grown[row, COLOURS.index(layout.crosses[number].colours[_EDGE_ARMS[edge % 12]])] = pixel
+                grown[row, MARKER_COLOURS.index(layout.crosses[number].colours[_EDGE_ARMS[edge % 12]])] = pixel
             cross.append(number)
             corner.append(k)
             slopes.append(np.linalg.solve(normals, lines.offsets[edges]))
@@ -90,7 +91,7 @@ def _seen(
     pixels = project(camera, _NO_MOTION, rays) if len(rays) else np.zeros((0, 2))
     return SeenCorners(
         found, which, places[found, which], pixels, slopes, information.reshape(-1, 2, 2),
-        growth.reshape(-1, 2, len(COLOURS)),
+        growth.reshape(-1, 2, len(MARKER_COLOURS)),
     )  # fmt: skip
 
 
@@ -120,7 +121,7 @@ def _fitted(
     """The edges from each corner of the crosses to the next."""
     first, last = places.reshape(-1, 3), np.roll(places, -1, axis=1).reshape(-1, 3)
     colours = np.array(
-        [COLOURS.index(layout.crosses[n].colours[arm]) for n in numbers for arm in _EDGE_ARMS], dtype=np.int64
+        [MARKER_COLOURS.index(layout.crosses[n].colours[arm]) for n in numbers for arm in _EDGE_ARMS], dtype=np.int64
     )
     pixels, normals = _samples(camera, camera_from_room, first, last)
     offsets = edge_offsets(

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glisson.core.arrays import FloatArray
-from glisson.core.crosses import COLOURS, CrossLayout, readings, unit_corners, unit_squares
+from glisson.core.crosses import CrossLayout, readings, unit_corners, unit_squares
+from glisson.core.marker_colours import MARKER_COLOURS
 
 HUES = np.array([[1.0, 0.0, 0.03], [1.0, 0.82, 0.0], [0.0, 1.0, 0.32], [0.0, 0.24, 1.0]])
 """What each colour is without its white part, the largest channel being 1."""
@@ -90,7 +91,7 @@ def colour_of(levels: FloatArray, paper: FloatArray) -> str:
         return _UNTOLD
     off = np.linalg.norm(HUES - hue / hue.max(), axis=1)
     first, second = np.argsort(off)[:2]
-    return COLOURS[first] if off[first] < _NEAR and off[second] > off[first] + _CLEARLY else _UNTOLD
+    return MARKER_COLOURS[first] if off[first] < _NEAR and off[second] > off[first] + _CLEARLY else _UNTOLD
 
 
 def _levels(image: NDArray[np.uint8], seen_from_cross: FloatArray, places: FloatArray) -> FloatArray:

@@ -1,6 +1,7 @@
 """What is measured in laparoscope views, and how far a state of scopes and points is from it."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -41,6 +42,21 @@ class Problem:
     known_mm: FloatArray
     known_covariance_mm2: FloatArray
 
+    @cached_property
+    def white_poses(self) -> FloatArray:
+        """Whitening (v, 6, 6) of the measured poses."""
+        return np.array([_whitening(pose.covariance) for pose in self.poses if pose.covariance is not None])
+
+    @cached_property
+    def white_hand_eye(self) -> FloatArray:
+        """Whitening (6, 6) of what the poses have in common; nought where that is not told apart."""
+        return np.zeros((6, 6)) if self.hand_eye_covariance is None else _whitening(self.hand_eye_covariance)
+
+    @cached_property
+    def white_known(self) -> FloatArray:
+        """Whitening (m, 3, 3) of the points."""
+        return _whitening(self.known_covariance_mm2)
+
 
 @dataclass(frozen=True, eq=False)
 class State:
@@ -78,9 +94,9 @@ def linearised(problem: Problem, state: State) -> Linearised:
     """Residuals and derivatives at a state; the cost is infinite where a point is behind a scope."""
     seen, by_pose, by_point, behind = _sightings(problem, state)
     prior, prior_by_pose, prior_by_hand_eye = _pose_priors(problem, state)
-    by_hand_eye = np.zeros((6, 6)) if problem.hand_eye_covariance is None else _whitening(problem.hand_eye_covariance)
+    by_hand_eye = problem.white_hand_eye
     hand_eye = by_hand_eye @ state.hand_eye
-    by_known = _whitening(problem.known_covariance_mm2)
+    by_known = problem.white_known
     known = (by_known @ (state.points_mm - problem.known_mm)[:, :, None])[:, :, 0]
     length = np.linalg.norm(seen, axis=1)
     weights = np.minimum(1.0, problem.cut / np.maximum(length, 1e-12))
@@ -118,8 +134,7 @@ def _pose_priors(problem: Problem, state: State) -> tuple[FloatArray, FloatArray
     views = len(problem.poses)
     rest, by_pose, by_hand_eye = np.zeros((views, 6)), np.zeros((views, 6, 6)), np.zeros((views, 6, 6))
     for number, pose in enumerate(problem.poses):
-        assert pose.covariance is not None  # a view has one
-        turn, white = state.rotations[number], _whitening(pose.covariance)
+        turn, white = state.rotations[number], problem.white_poses[number]
         common = np.kron(np.eye(2), turn)
         apart = Rotation.from_matrix(turn @ pose.rotation.T).as_rotvec()
         off = np.concatenate([apart, state.centres_mm[number] - pose.translation_mm]) - common @ state.hand_eye

@@ -49,6 +49,14 @@ def new_figure(width_px: int, height_px: int) -> Figure:
     return figure
 
 
+def pixels_of(figure: Figure) -> NDArray[np.uint8]:
+    """The figure as [row, column, red green blue]."""
+    stream = BytesIO()
+    figure.savefig(stream, format="rgba", dpi=DOTS_PER_INCH)
+    width, height = (round(size * DOTS_PER_INCH) for size in figure.get_size_inches())
+    return np.frombuffer(stream.getvalue(), dtype=np.uint8).reshape(height, width, 4)[:, :, :3].copy()
+
+
 def framed(image: NDArray[np.uint8], camera: Camera, title: str, legend: dict[str, Rgb]) -> tuple[Figure, Axes]:
     """A figure that shows a rendered image pixel by pixel, with title, legend, orientation triad and scale bar."""
     figure = new_figure(camera.width, camera.height)

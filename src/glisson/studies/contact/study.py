@@ -78,7 +78,7 @@ def _lines(values: Mapping[str, Any]) -> list[str]:
     if values["apart_mm"]:
         spread = values["apart_mm"]
         lines.append(
-            f"apart     median {spread['median']:.2f} mm, 95th percentile {spread['tail']:.2f} mm, "
+            f"apart     median {spread['median']:.2f} mm, 95th percentile {spread['p95']:.2f} mm, "
             f"worst {spread['worst']:.2f} mm, where the branch is the same"
         )
     lines += [

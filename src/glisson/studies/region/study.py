@@ -88,10 +88,11 @@ def _factor(estimated: float, true: float) -> float:
 def _lines(values: Mapping[str, Any]) -> list[str]:
     names = {"times_as_fast": "faster", "apart_mm": "apart (mm)", "estimate_off_by": "estimate off by a factor"}
     lines = [
-        f"{words:25} median {spread['median']:.3g}, {'5th' if name == 'times_as_fast' else '95th'} percentile "
-        f"{spread['tail']:.3g}, worst {spread['worst']:.3g}"
+        f"{words:25} median {spread['median']:.3g}, {tail[1:]}th percentile {spread[tail]:.3g}, worst "
+        f"{spread['worst']:.3g}"
         for name, words in names.items()
         if (spread := values[name]) is not None
+        for tail in spread.keys() - {"median", "worst"}
     ]
     lines += [f"failed    member {row['member']}: {row['message']}" for row in values["failed"]]
     if values["unfinished"]:

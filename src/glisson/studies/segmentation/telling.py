@@ -19,10 +19,10 @@ def as_lines(values: Mapping[str, Any]) -> list[str]:
     for group in values["scores"]:
         for name, (words, digits) in _NAMES.items():
             if (spread := group[name]) is not None:
-                tail = "5th" if name == "dice" else "95th"
+                words_of_tail, tail = ("5th", "p5") if name == "dice" else ("95th", "p95")
                 lines.append(
-                    f"{group['modality']}, {group['start']:9} {words:10} median {spread['median']:.{digits}f}, {tail} "
-                    f"percentile {spread['tail']:.{digits}f}, worst {spread['worst']:.{digits}f}"
+                    f"{group['modality']}, {group['start']:9} {words:10} median {spread['median']:.{digits}f}, "
+                    f"{words_of_tail} percentile {spread[tail]:.{digits}f}, worst {spread['worst']:.{digits}f}"
                 )
     lines += [
         f"flags     {found['failure']:15} {100.0 * found['recall']:.1f} % of {found['failed_slices']} failed slices, "

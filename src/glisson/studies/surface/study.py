@@ -18,7 +18,7 @@ from glisson.studies.surface.pixels import PIXELS
 from glisson.studies.surface.printed import PRINTED_MM
 from glisson.studies.surface.tasks import BREATHING, FIT, PAIRS, RECONSTRUCT, TEN
 from glisson.studies.surface.telling import as_lines, as_page, draw_errors
-from glisson.studies.tables import as_csv
+from glisson.studies.tables import as_csv, distribution
 
 SEEDS, QUICK_SEEDS = 1000, 25
 FIT_SEEDS, QUICK_FIT_SEEDS = 1000, 200
@@ -156,10 +156,7 @@ def _rendered(rows: Sequence[Mapping[str, Any]], name: str) -> dict[str, Any]:
 
 def _spread(rows: Sequence[Mapping[str, Any]]) -> dict[str, float] | None:
     """Median, 95th percentile and worst of the six points' mean errors."""
-    means = [float(np.mean(row["errors_mm"])) for row in rows if row["errors_mm"]]
-    if not means:
-        return None
-    return {"median": float(np.median(means)), "p95": float(np.percentile(means, 95)), "worst": max(means)}
+    return distribution([float(np.mean(row["errors_mm"])) for row in rows if row["errors_mm"]])
 
 
 def _coverage(rows: Sequence[Mapping[str, Any]]) -> float | None:

@@ -23,6 +23,7 @@ from glisson.phantom.room_view import RoomViews
 from glisson.phantom.wheel_scene import WheelScene, draw_scene
 from glisson.phantom.wheel_view import WheelViews
 from glisson.studies.point import Outcome, Task
+from glisson.studies.tables import distribution
 from glisson.studies.trocar.rooms import RECOMMENDED, View, draw_view
 
 RECOGNITION = Task(
@@ -75,13 +76,13 @@ def recognition_values(rows: Sequence[Row]) -> dict[str, Any]:
         "right": sum(row["right"] for row in seen),
         "wrong": sum(not row["right"] for row in seen),
         "flagged": len(rows) - len(seen),
-        "tip_mm": _spread(seen, "tip_mm"),
-        "axis_deg": _spread(seen, "axis_deg"),
+        "tip_mm": distribution([row["tip_mm"] for row in seen]),
+        "axis_deg": distribution([row["axis_deg"] for row in seen]),
         "coverage90": _mean(seen, "inside90"),
-        "milliseconds": _spread(seen, "milliseconds"),
+        "milliseconds": distribution([row["milliseconds"] for row in seen]),
         "in_room": len(in_room),
         "placed": len(placed),
-        "room_tip_mm": _spread(placed, "room_tip_mm"),
+        "room_tip_mm": distribution([row["room_tip_mm"] for row in placed]),
         "room_coverage90": _mean(placed, "room_inside90"),
         "other_size_flagged": _mean([{"flagged": row["other_size_status"] != "converged"} for row in rows], "flagged"),
     }
@@ -142,13 +143,6 @@ def _in_room(
 
 def _is_inside(off: FloatArray, covariance: FloatArray) -> bool:
     return float(off @ np.linalg.solve(covariance, off)) < _CHI2_90
-
-
-def _spread(rows: Sequence[Row], name: str) -> dict[str, float] | None:
-    found = [row[name] for row in rows]
-    if not found:
-        return None
-    return {"median": float(np.median(found)), "p95": float(np.percentile(found, 95)), "worst": max(found)}
 
 
 def _mean(rows: Sequence[Row], name: str) -> float | None:

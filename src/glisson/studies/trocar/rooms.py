@@ -70,9 +70,7 @@ def _surveyed(layout: CrossLayout, rng: np.random.Generator) -> CrossLayout:
     crosses = []
     for cross in layout.crosses:
         step = rng.normal(size=6) * sigmas
-        place = cross.room_from_cross
-        turned = Rotation.from_rotvec(step[:3]).as_matrix() @ place.rotation
-        given = RigidTransform("room", "cross", turned, place.translation_mm + step[3:], np.diag(sigmas**2))
+        given = replace(cross.room_from_cross.moved(step), covariance=np.diag(sigmas**2))
         crosses.append(replace(cross, room_from_cross=given))
     return CrossLayout(tuple(crosses))
 

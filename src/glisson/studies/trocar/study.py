@@ -10,7 +10,7 @@ import numpy as np
 from glisson.studies.page import png
 from glisson.studies.point import Outcome, Point
 from glisson.studies.study import Conclusion
-from glisson.studies.tables import as_csv
+from glisson.studies.tables import as_csv, distribution
 from glisson.studies.trocar.recognition import RECOGNITION, recognition_values
 from glisson.studies.trocar.rooms import ANY, RECOMMENDED, SURVEYED
 from glisson.studies.trocar.tasks import CORNERS, IMAGES
@@ -123,10 +123,7 @@ class TrocarStudy:
 
 def spread(rows: Sequence[Row], name: str) -> dict[str, float] | None:
     """Median, 95th percentile and worst of what is not flagged."""
-    found = [row[name] for row in rows if row["status"] == "converged"]
-    if not found:
-        return None
-    return {"median": float(np.median(found)), "p95": float(np.percentile(found, 95)), "worst": max(found)}
+    return distribution([row[name] for row in rows if row["status"] == "converged"])
 
 
 def _groups() -> list[tuple[str, str, str]]:
@@ -174,8 +171,7 @@ def _coverage(rows: Sequence[Row]) -> float | None:
 
 
 def _milliseconds(rows: Sequence[Row]) -> dict[str, float] | None:
-    found = [row["milliseconds"] for row in rows if row["milliseconds"] is not None]
-    return {"median": float(np.median(found)), "p95": float(np.percentile(found, 95))} if found else None
+    return distribution([row["milliseconds"] for row in rows if row["milliseconds"] is not None])
 
 
 def _database(rows: Sequence[Row]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from glisson.core.status import Status
 from glisson.studies.page import png
 from glisson.studies.point import Outcome, Point
 from glisson.studies.study import Conclusion
-from glisson.studies.tables import as_csv
+from glisson.studies.tables import as_csv, distribution
 from glisson.studies.ventilation.figures import draw_all
 from glisson.studies.ventilation.tasks import BREATHS, CONVENTIONAL, MEASURE, SWEEP
 from glisson.studies.ventilation.telling import as_lines, as_page
@@ -145,7 +145,7 @@ def _plateaus(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return {
         "found_within": _share(sum(near), len(can)),
         "found_within_from_pixels": _share(sum(pixels), len(pixels)),
-        "error_hz": _spread([abs(row["found"] - row["true"]) for row in answered]),
+        "error_hz": distribution([abs(row["found"] - row["true"]) for row in answered]),
         "interval_holds": _share(sum(held), len(held)),
         "resolvable": len(can),
         "false_flags": _share(len(can) - len(answered), len(can)),
@@ -164,22 +164,12 @@ def _breath_errors(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     for name, from_pixels in (("simulated", False), ("from_pixels", True)):
         here = [row for row in rows if row["from_pixels"] == from_pixels and not row["message"]]
         errors[name] = {
-            "phase_worst": _spread([row["phase_worst"] for row in here]),
-            "residual_mm": _spread([row["residual_mm"] for row in here]),
-            "residual_worst_mm": _spread([row["residual_worst_mm"] for row in here]),
+            "phase_worst": distribution([row["phase_worst"] for row in here]),
+            "residual_mm": distribution([row["residual_mm"] for row in here]),
+            "residual_worst_mm": distribution([row["residual_worst_mm"] for row in here]),
             "failed": sum(bool(row["message"]) for row in rows if row["from_pixels"] == from_pixels),
         }
     return errors
-
-
-def _spread(values: Sequence[float]) -> dict[str, float] | None:
-    if not values:
-        return None
-    return {
-        "median": float(np.median(values)),
-        "p95": float(np.percentile(values, 95.0)),
-        "worst": float(max(values)),
-    }
 
 
 def _share(part: int, whole: int) -> float | None:

@@ -1,0 +1,58 @@
+"""Technique "linear-basis": the organ turns as one piece and deforms by linear responses to its surface."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from glisson.core.model import Model
+from glisson.core.observations import Observations
+from glisson.core.protocols import Progress, silent
+from glisson.core.registered import Registered
+from glisson.mechanics.registration.basis import boundary_responses
+from glisson.mechanics.registration.checks import check_observations
+from glisson.mechanics.registration.elastic_fit import elastic_fit
+from glisson.mechanics.registration.motion import BasisMotion
+from glisson.mechanics.registration.seen import ModelError
+
+
+@dataclass(frozen=True)
+class LinearBasisParameters:
+    """Of the linear basis.
+
+    `controls` is the number of points of the surface that move; `energy_uj_per_kpa` how much strain energy (µJ) is
+    expected per unknown, for a Young's modulus of 1 kPa; the model's error in mm, over which length (mm) alike.
+    """
+
+    controls: int = 45
+    energy_uj_per_kpa: float = 50.0
+    model_error_mm: float = 1.0
+    model_error_length_mm: float = 20.0
+
+
+class LinearBasis:
+    """Boundary responses with a strain-energy weight, after Heiselman, Jarnagin and Miga 2020 (LIBR)."""
+
+    name: ClassVar[str] = "linear-basis"
+    summary: ClassVar[str] = "linear elastic responses to points of the surface that move"
+    Parameters: ClassVar[type[LinearBasisParameters]] = LinearBasisParameters
+
+    def __init__(self, parameters: LinearBasisParameters) -> None:
+        self._parameters = parameters
+
+    @classmethod
+    def missing_dependencies(cls) -> tuple[str, ...]:
+        """Nothing beyond the core."""
+        return ()
+
+    def register(self, model: Model, observations: Observations, progress: Progress = silent) -> Registered:
+        """See `Registration`."""
+        check_observations(model, observations)
+        progress(0.0, "responses of the surface")
+        chosen = self._parameters
+        modes = boundary_responses(model, chosen.controls)
+        softest = min(material.young_modulus_kpa for material in model.materials.values())
+        precision = np.diag(2.0 * modes.energies_uj / (chosen.energy_uj_per_kpa * softest))
+        motion = BasisMotion(model.mesh.nodes, modes.basis, precision)
+        error = ModelError(chosen.model_error_mm, chosen.model_error_length_mm)
+        return elastic_fit(model, observations, motion, error, progress)

@@ -1,0 +1,58 @@
+"""What was seen as scalar rows: each pulls one material point along one direction."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from glisson.core.arrays import FloatArray, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """r rows; the point of a row is Σ weight · node, and its residual direction · (seen − point) / sigma.
+
+    Args:
+        nodes: (r, a) node numbers.
+        weights: (r, a) of the nodes.
+        directions: (r, 3) unit vectors in the observations' frame.
+        gaps_mm: (r,) direction · (seen − point).
+        sigma_mm: (r,) standard deviation of the gap.
+        point: (r,) number of the observed point that the row belongs to; its rows count or are set aside together.
+        robust: (r,) whether the point may be an outlier.
+    """
+
+    nodes: IntArray
+    weights: FloatArray
+    directions: FloatArray
+    gaps_mm: FloatArray
+    sigma_mm: FloatArray
+    point: IntArray
+    robust: FloatArray
+
+    @property
+    def residuals(self) -> FloatArray:
+        """Whitened gaps (r,)."""
+        return self.gaps_mm / self.sigma_mm
+
+    def squares(self, count: int) -> FloatArray:
+        """Sum of the squares of the whitened gaps of each of `count` observed points."""
+        return np.bincount(self.point, self.residuals**2, minlength=count)
+
+
+def joined(parts: Sequence[Rows]) -> Rows:
+    """All rows in one, in order. Points with fewer nodes than others get nodes of no weight."""
+    widest = max(part.nodes.shape[1] for part in parts)
+
+    def wide(array: FloatArray | IntArray) -> FloatArray | IntArray:
+        return np.pad(array, ((0, 0), (0, widest - array.shape[1])))
+
+    return Rows(
+        nodes=np.concatenate([wide(part.nodes) for part in parts]).astype(np.int64),
+        weights=np.concatenate([wide(part.weights) for part in parts]).astype(np.float64),
+        directions=np.concatenate([part.directions for part in parts]),
+        gaps_mm=np.concatenate([part.gaps_mm for part in parts]),
+        sigma_mm=np.concatenate([part.sigma_mm for part in parts]),
+        point=np.concatenate([part.point for part in parts]),
+        robust=np.concatenate([part.robust for part in parts]),
+    )

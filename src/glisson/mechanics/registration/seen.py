@@ -1,0 +1,175 @@
+"""What was seen, held against a model: which material point each seen point belongs to."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from glisson.core.arrays import FloatArray, IntArray
+from glisson.core.model import Model
+from glisson.core.observations import Observation, Observations
+from glisson.geometry.distance import SurfaceTree
+from glisson.mechanics.registration.places import MaterialCurve, MaterialPoints, Places
+from glisson.mechanics.registration.rows import Rows, joined
+
+_TOUCHING_MM = 1e-6
+
+
+@dataclass(frozen=True)
+class ModelError:
+    """How far the model cannot follow the organ, however well it is fitted.
+
+    Args:
+        sigma_mm: standard deviation of a material point.
+        length_mm: points nearer to each other than this are off together.
+    """
+
+    sigma_mm: float
+    length_mm: float
+
+
+class Match(Protocol):
+    """One observation, held against the model."""
+
+    def rows(self, positions: FloatArray, first: int) -> Rows:
+        """Its rows, with the nodes at `positions` (n, 3); its points are numbered from `first`."""
+
+
+class Seen:
+    """All that was seen.
+
+    Args:
+        model: the organ.
+        observations: in any frame.
+        model_error: is added to each point's own.
+    """
+
+    def __init__(self, model: Model, observations: Observations, model_error: ModelError) -> None:
+        places = Places(model)
+        self._matches: list[Match] = []
+        self._firsts: list[int] = []
+        self.count = 0
+        for item in observations.items:
+            self._firsts.append(self.count)
+            self.count += len(item.points_mm)
+            covariance = _with_model_error(item, model_error)
+            if item.kind == "landmark":
+                self._matches.append(PointMatch(item.points_mm, covariance, places.landmark(item.name)))
+            elif item.kind == "curve":
+                self._matches.append(CurveMatch(item.points_mm, covariance, places.curve(item.name)))
+            else:
+                self._matches.append(SurfaceMatch(item.points_mm, covariance, places.surface(item.name)))
+
+    def rows(self, positions: FloatArray) -> Rows:
+        """All rows, with the nodes at `positions` (n, 3)."""
+        parts = zip(self._matches, self._firsts, strict=True)
+        return joined([match.rows(positions, first) for match, first in parts])
+
+
+class SurfaceMatch:
+    """Points somewhere on a surface: each pulls at the nearest point of it, along the line between them."""
+
+    def __init__(self, points_mm: FloatArray, covariance_mm2: FloatArray, triangles: IntArray) -> None:
+        self._points, self._covariance, self._triangles = points_mm, covariance_mm2, triangles
+
+    def rows(self, positions: FloatArray, first: int) -> Rows:
+        """See `Match`."""
+        nearest = SurfaceTree(positions, self._triangles).nearest(self._points)
+        nodes = self._triangles[nearest.triangles]
+        arms = self._points - nearest.closest_mm
+        corners = positions[nodes]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        touching = nearest.distance_mm < _TOUCHING_MM
+        directions = np.where(touching[:, None], normals, arms)
+        directions /= np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-300)
+        return _along(directions, nearest.distance_mm, self._covariance, nodes, nearest.barycentric, first, True)
+
+
+class PointMatch:
+    """A material point that is seen, perhaps several times."""
+
+    def __init__(self, points_mm: FloatArray, covariance_mm2: FloatArray, place: MaterialPoints) -> None:
+        self._points, self._place = points_mm, place
+        values, self._axes = np.linalg.eigh(covariance_mm2)
+        self._sigma = np.sqrt(values)
+
+    def rows(self, positions: FloatArray, first: int) -> Rows:
+        """See `Match`: three rows for each, along the axes of its ellipsoid."""
+        count = len(self._points)
+        gaps = np.einsum("pia,pi->pa", self._axes, self._points - self._place.at(positions))
+        return Rows(
+            nodes=np.repeat(self._place.nodes, 3 * count, axis=0),
+            weights=np.repeat(self._place.weights, 3 * count, axis=0),
+            directions=self._axes.transpose(0, 2, 1).reshape(-1, 3),
+            gaps_mm=gaps.ravel(),
+            sigma_mm=self._sigma.ravel(),
+            point=first + np.repeat(np.arange(count), 3),
+            robust=np.zeros(3 * count),
+        )
+
+
+class CurveMatch:
+    """Points along a curve in the tissue, which may slide: each pulls at the nearest point of it."""
+
+    def __init__(self, points_mm: FloatArray, covariance_mm2: FloatArray, curve: MaterialCurve) -> None:
+        self._points, self._covariance, self._curve = points_mm, covariance_mm2, curve
+
+    def rows(self, positions: FloatArray, first: int) -> Rows:
+        """See `Match`: two rows for each, across the curve; beyond its ends the nearest end."""
+        places = self._curve.points.at(positions)
+        begin, end = (places[self._curve.segments[:, side]] for side in (0, 1))
+        along = end - begin
+        squared = np.maximum((along**2).sum(axis=1), 1e-12)
+        reach = np.einsum("psi,si->ps", self._points[:, None] - begin[None], along) / squared
+        share = np.clip(reach, 0.0, 1.0)
+        off = np.linalg.norm(self._points[:, None] - begin - share[:, :, None] * along, axis=2)
+        nearest = off.argmin(axis=1)
+        share = np.take_along_axis(share, nearest[:, None], axis=1)[:, 0]
+        ends = self._curve.segments[nearest]
+        nodes = np.concatenate([self._curve.points.nodes[ends[:, side]] for side in (0, 1)], axis=1)
+        weights = np.concatenate(
+            [
+                (1.0 - share)[:, None] * self._curve.points.weights[ends[:, 0]],
+                share[:, None] * self._curve.points.weights[ends[:, 1]],
+            ],
+            axis=1,
+        )
+        arms = self._points - begin[nearest] - share[:, None] * along[nearest]
+        first_across, second_across = _across(along[nearest])
+        parts = [
+            _along(axis, np.einsum("pi,pi->p", arms, axis), self._covariance, nodes, weights, first, True)
+            for axis in (first_across, second_across)
+        ]
+        return joined(parts)
+
+
+def _along(
+    directions: FloatArray, gaps: FloatArray, covariance: FloatArray, nodes: IntArray, weights: FloatArray, first: int,
+    robust: bool,
+) -> Rows:  # fmt: skip
+    """One row for each point, along its direction."""
+    sigma = np.sqrt(np.einsum("pi,pij,pj->p", directions, covariance, directions))
+    count = len(gaps)
+    return Rows(nodes, weights, directions, gaps, sigma, first + np.arange(count), np.full(count, float(robust)))
+
+
+def _across(along: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Two unit vectors (p, 3) across each of some directions (p, 3), and across each other."""
+    unit = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
+    least = np.eye(3)[np.abs(unit).argmin(axis=1)]
+    one = np.cross(unit, least)
+    one /= np.linalg.norm(one, axis=1, keepdims=True)
+    return one, np.cross(unit, one)
+
+
+def _with_model_error(item: Observation, error: ModelError) -> FloatArray:
+    """Covariance (p, 3, 3) of each point: its own, and the model's, which neighbours share."""
+    count = len(item.points_mm)
+    own = item.covariance_mm2
+    if own is None:
+        own = np.tile(item.sigma_mm**2 * np.eye(3), (count, 1, 1))
+    near = KDTree(item.points_mm).query_ball_point(item.points_mm, error.length_mm, return_length=True)
+    # Points that are off together by the same error tell no more than one of them does.
+    shared: FloatArray = own + error.sigma_mm**2 * near[:, None, None] * np.eye(3)
+    return shared
