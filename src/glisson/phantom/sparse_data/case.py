@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from glisson.core.arrays import FloatArray
 from glisson.core.observations import Observations
@@ -15,7 +16,6 @@ from glisson.phantom.sparse_data.design import CaseDesign
 from glisson.phantom.sparse_data.liver import SparseLiver
 from glisson.phantom.sparse_data.observing import FRONT, draw_room_from_patient, observe
 from glisson.phantom.sparse_data.swabbing import Swab, swab
-from scipy.spatial import cKDTree
 
 Carry = Callable[[FloatArray], FloatArray]
 """Where the truth takes material points (n, 3) of A, LPS mm."""

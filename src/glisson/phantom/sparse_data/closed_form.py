@@ -64,9 +64,7 @@ class Bend:
         """Where material points (n, 3) go."""
         x, y, z = self.frame.local(points).T
         radius, angle = self._radius(x), y / self.radius_mm
-        return self.frame.world(
-            np.stack([radius * np.cos(angle) - self.radius_mm, radius * np.sin(angle), z], axis=1)
-        )
+        return self.frame.world(np.stack([radius * np.cos(angle) - self.radius_mm, radius * np.sin(angle), z], axis=1))
 
     def back(self, points: ArrayLike) -> FloatArray:
         """Where points (n, 3) of the deformed body were."""

@@ -56,7 +56,9 @@ class Design:
 
     def __post_init__(self) -> None:
         if min(self.livers, self.views) < 1 or min(self.seed, self.first_member, self.packings, self.bends) < 0:
-            raise BadInput("A design of sparse-data cases needs one liver and one view at least, and no negative count.")
+            raise BadInput(
+                "A design of sparse-data cases needs at least one liver and one view, and no negative number."
+            )
 
     @property
     def members(self) -> tuple[int, ...]:

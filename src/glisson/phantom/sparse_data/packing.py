@@ -1,6 +1,6 @@
 """The liver packed from below: what is done to it, and the finite-element model that tells where it goes.
 
-As in the challenge's phantom, packs push the underside up in front by 10 to 30 mm. The model is not the one under test:
+As in the challenge's phantom, packs push the underside towards the front. The model is not the one under test:
 its law is the neo-Hookean one in logarithms, its tissue uneven, its attachments follow the exact vena cava and the
 falciform ligament, and a part of gravity acts, because the table is tilted.
 """
@@ -49,7 +49,7 @@ class Pack:
 
 @dataclass(frozen=True)
 class Packing:
-    """Packs, tissue and ligaments; gravity (unit vector, LPS) acts by its change since the scan, a `share_of_weight`."""
+    """Packs, tissue and ligaments; of `gravity` (unit vector, LPS) a share acts: what has changed since the scan."""
 
     packs: tuple[Pack, ...]
     gravity: tuple[float, float, float]

@@ -1,26 +1,26 @@
 """Two rigid registrations that know the truth: no rigid technique can be expected to do better.
 
 They say how hard the cases are. `of_targets` is the rigid motion that fits the targets best; `of_data` is what closest
-points (Besl and McKay 1992) come to on what was seen, started at that motion.
+points (Besl and McKay 1992), features to features, come to on what was seen, started at that motion.
 """
 
 import numpy as np
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from glisson.core.arrays import FloatArray
-from glisson.core.mesh import TriangleSurface
 from glisson.core.transform import RigidTransform
 from glisson.geometry.distance import SurfaceTree
 from glisson.phantom.sparse_data.case import SparseCase
 from glisson.phantom.sparse_data.liver import SparseLiver
-from glisson.phantom.sparse_data.observing import FRONT
-from scipy.spatial import cKDTree
 from glisson.phantom.sparse_data.swabbing import evenly_along
 
 _ROUNDS = 100
 _STILL_MM = 1e-3
 _DOUBT_MM = 5.0
 """A residual of so much halves a point's weight, so that wrong points hardly count."""
+
+_CURVE_STEP_MM = 1.0
 
 
 def of_targets(case: SparseCase) -> RigidTransform:
@@ -29,13 +29,22 @@ def of_targets(case: SparseCase) -> RigidTransform:
 
 
 def of_data(case: SparseCase, liver: SparseLiver) -> RigidTransform:
-    """room_from_patient that brings a scanned surface (LPS mm) closest to what was seen."""
+    """room_from_patient that brings the scanned surface, without any error of its own, closest to what was seen."""
     items = case.observations.items
-    seen = np.vstack([item.points_mm for item in items])
-    found, trees = of_targets(case), [_tree(liver, item.name) for item in items]
+    surface = SurfaceTree(liver.surface.vertices, liver.surface.triangles)
+    curves = {name: evenly_along(curve, _CURVE_STEP_MM) for name, curve in liver.features.items()}
+    trees = {name: cKDTree(points) for name, points in curves.items()}
+    seen, found = np.vstack([item.points_mm for item in items]), of_targets(case)
     for _ in range(_ROUNDS):
-        back = found.inverse()
-        closest = np.vstack([tree(back.apply(item.points_mm)) for tree, item in zip(trees, items)])
+        patient_from_room = found.inverse()
+        parts = []
+        for item in items:
+            back = patient_from_room.apply(item.points_mm)
+            if item.name in curves:
+                parts.append(curves[item.name][trees[item.name].query(back)[1]])
+            else:
+                parts.append(surface.nearest(back).closest_mm)
+        closest = np.vstack(parts)
         away = np.linalg.norm(found.apply(closest) - seen, axis=1)
         better = _fitted(closest, seen, 1.0 / (1.0 + (away / _DOUBT_MM) ** 2))
         moved = np.abs(better.apply(closest) - found.apply(closest)).max()
@@ -44,12 +53,6 @@ def of_data(case: SparseCase, liver: SparseLiver) -> RigidTransform:
             break
     return found
 
-
-def _tree(liver,name):
-    S=liver.surface
-    if name==FRONT:
-        t=SurfaceTree(S.vertices,S.triangles); return lambda p: t.nearest(p).closest_mm
-    q=evenly_along(liver.features[name],1.0); k=cKDTree(q); return lambda p: q[k.query(p)[1]]
 
 def _fitted(patient: FloatArray, room: FloatArray, weights: FloatArray) -> RigidTransform:
     middle, centre = (np.average(points, axis=0, weights=weights) for points in (patient, room))
