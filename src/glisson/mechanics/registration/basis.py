@@ -16,8 +16,6 @@ from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.linear_solvers import make_direct_solver
 from glisson.mechanics.pattern import FreeSystem, Stiffness, block_pattern
 
-_RIGID = 6
-
 
 @dataclass(frozen=True, eq=False)
 class ElasticModes:
@@ -58,10 +56,18 @@ def boundary_responses(model: Model, count: int) -> ElasticModes:
             pulled[controls[column // 3], column % 3] = 1.0
             load = -(matrix @ pulled.ravel()).reshape(-1, 3)
             load[fixed] = 0.0
-            basis[:, :, column] = pulled + solver.solve(load, 0.0)
+            answer = solver.solve(load, 0.0)
+            assert answer is not None  # a direct solver has factored it
+            basis[:, :, column] = pulled + answer
     finally:
         solver.close()
     flat = basis.reshape(-1, basis.shape[2])
-    values, vectors = eigh(flat.T @ (matrix @ flat), flat.T @ flat / len(mesh.nodes))
     # The six of no energy are the rigid motions, of which a motion has its own unknowns.
-    return ElasticModes(basis @ vectors[:, _RIGID:], 0.5 * values[_RIGID:])
+    return elastic_modes(basis, flat.T @ (matrix @ flat), rigid=6)
+
+
+def elastic_modes(basis: FloatArray, stiffness: FloatArray, rigid: int = 0) -> ElasticModes:
+    """Modes of a basis (n, 3, k) with the strain energy ½ aᵀ S a, but for the `rigid` softest."""
+    flat = basis.reshape(-1, basis.shape[2])
+    values, vectors = eigh(stiffness, flat.T @ flat / len(basis))
+    return ElasticModes(basis @ vectors[:, rigid:], 0.5 * values[rigid:])

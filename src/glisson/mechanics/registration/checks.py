@@ -29,7 +29,7 @@ def check_observations(model: Model, observations: Observations) -> None:
     seen = float(np.linalg.norm(np.ptp(points, axis=0)))
     if seen < _METRES * organ and seen > 0.0:
         raise BadInput(
-            f"The observations span {seen:.3g} mm and the organ {organ:.0f} mm; they look like metres, give millimetres."
+            f"The observations span {seen:.3g} mm and the organ {organ:.0f} mm; these look like metres; give mm."
         )
     if seen > _MUCH_LARGER * organ:
         raise BadInput(f"The observations span {seen:.0f} mm, but the organ only {organ:.0f} mm; check the units.")

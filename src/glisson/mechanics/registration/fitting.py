@@ -10,17 +10,15 @@ from glisson.core.arrays import FloatArray
 from glisson.core.errors import StageFailed
 from glisson.core.status import Status
 from glisson.mechanics.registration.motion import Motion, MotionState
+from glisson.mechanics.registration.outliers import CUTS, judged
 from glisson.mechanics.registration.rows import Rows
 from glisson.mechanics.registration.seen import Seen
 
 _ITERATIONS = 200
-_AT_REST = 0.002
+_AT_REST = 1e-5
 """A step that promises to lower half the sum of squares by less than this is nothing beside its noise, which is 1."""
 
 _LONGEST_MM = 15.0
-_CUT = 3.0
-_ANNEALED = (8.0, 4.0, 2.0, 1.0)
-"""Outliers are told by a scale that shrinks to `_CUT` standard deviations, so that a far start finds its way."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +50,8 @@ def fit(motion: Motion, seen: Seen, start: MotionState, told: Callable[[int], No
         StageFailed: it does not come to rest, or nothing holds the organ.
     """
     state = start
-    for widening in _ANNEALED:
-        found = _descend(motion, seen, state, _CUT * widening, told)
+    for cut in CUTS:
+        found = _descend(motion, seen, state, cut, told)
         state = found.state
     return found
 
@@ -89,16 +87,12 @@ def _descend(motion: Motion, seen: Seen, state: MotionState, cut: float, told: C
 
 def _at(motion: Motion, seen: Seen, state: MotionState, cut: float) -> Fit:
     rows = seen.rows(motion.positions(state))
-    squares = rows.squares(seen.count)
-    may_lie = np.bincount(rows.point, rows.robust, minlength=seen.count) > 0.0
-    share = 1.0 / (1.0 + squares / cut**2)
-    weights = np.where(may_lie, share**2, 1.0)
-    costs = np.where(may_lie, squares * share, squares)
+    judgement = judged(rows, seen.count, cut)
     own, pull, prior = motion.prior(state)
     jacobian = _jacobian(motion, state, rows)
-    weighted = jacobian * weights[rows.point, None]
+    weighted = jacobian * judgement.weights[rows.point, None]
     gradient = pull - weighted.T @ rows.residuals
-    return Fit(state, rows, weights, weighted.T @ jacobian, prior, gradient, 0.5 * float(costs.sum()) + own)
+    return Fit(state, rows, judgement.weights, weighted.T @ jacobian, prior, gradient, judgement.cost + own)
 
 
 def _jacobian(motion: Motion, state: MotionState, rows: Rows) -> FloatArray:

@@ -19,14 +19,14 @@ from glisson.mechanics.registration.places import Places
 _POINTS = 60
 _PLACES = 24
 _ROUNDS = ((1, 40.0, 400), (3, 30.0, 60), (20, 15.0, 20), (20, 6.0, 8))
-"""Iterations, the scale in mm beyond which points count little (Geman and McClure), and how many starts go on."""
+"""Iterations, the scale in mm beyond which points count little (Geman and McClure), how many starts go on."""
 
 _APART_MM = 3.0
 
 
 @dataclass(frozen=True, eq=False)
 class RigidStart:
-    """x = R X + t takes the model to the observations; `cost_mm` is a mean distance in which far points count little."""
+    """x = R X + t takes the model to the observations; `cost_mm` is a mean distance, far points counting little."""
 
     rotation: FloatArray
     translation_mm: FloatArray

@@ -25,7 +25,7 @@ class LinearBasisParameters:
     """
 
     controls: int = 45
-    energy_uj_per_kpa: float = 50.0
+    energy_uj_per_kpa: float = 2000.0
     model_error_mm: float = 1.0
     model_error_length_mm: float = 20.0
 

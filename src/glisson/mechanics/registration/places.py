@@ -20,7 +20,8 @@ class MaterialPoints:
 
     def at(self, positions: FloatArray) -> FloatArray:
         """Where they are (m, 3) when the nodes are at `positions` (n, 3)."""
-        return np.einsum("ma,mai->mi", self.weights, positions[self.nodes])
+        places: FloatArray = np.einsum("ma,mai->mi", self.weights, positions[self.nodes])
+        return places
 
 
 @dataclass(frozen=True, eq=False)

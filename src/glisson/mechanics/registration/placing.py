@@ -9,9 +9,11 @@ from glisson.core.model import Model
 from glisson.core.observations import Observations
 from glisson.mechanics.registration.fitting import Fit, fit
 from glisson.mechanics.registration.global_start import rigid_starts
-from glisson.mechanics.registration.motion import BasisMotion
-from glisson.mechanics.registration.outcome import rest_state
-from glisson.mechanics.registration.seen import Seen
+from glisson.mechanics.registration.motion import BasisMotion, MotionState
+from glisson.mechanics.registration.seen import ModelError, Seen
+
+RIGID_ERROR = ModelError(4.0, 40.0)
+"""How far an organ is off that cannot deform."""
 
 _REFINED = 4
 _AS_GOOD = 1.05
@@ -35,7 +37,8 @@ def placed(model: Model, observations: Observations, seen: Seen, motion: BasisMo
     fits: list[Fit] = []
     for start in rigid_starts(model, observations)[:_REFINED]:
         try:
-            fits.append(fit(motion, seen, rest_state(start.rotation, start.translation_mm, motion.middle_mm, 0)))
+            shift = start.rotation @ motion.middle_mm + start.translation_mm - motion.middle_mm
+            fits.append(fit(motion, seen, MotionState(start.rotation, shift, np.zeros(0))))
         except StageFailed as failure:
             last = failure
     if not fits:

@@ -9,17 +9,17 @@ from glisson.core.protocols import Progress, silent
 from glisson.core.registered import Registered
 from glisson.mechanics.registration.checks import check_observations
 from glisson.mechanics.registration.motion import BasisMotion
-from glisson.mechanics.registration.outcome import outcome
-from glisson.mechanics.registration.placing import placed
+from glisson.mechanics.registration.outcome import outcome, posterior_spread
+from glisson.mechanics.registration.placing import RIGID_ERROR, placed
 from glisson.mechanics.registration.seen import ModelError, Seen
 
 
 @dataclass(frozen=True)
 class RigidParameters:
-    """Model error: how far a rigid organ is off (mm), over which length (mm) alike."""
+    """How far a rigid organ is off (mm), and over which length (mm) alike."""
 
-    model_error_mm: float = 4.0
-    model_error_length_mm: float = 40.0
+    model_error_mm: float = RIGID_ERROR.sigma_mm
+    model_error_length_mm: float = RIGID_ERROR.length_mm
 
 
 class Rigid:
@@ -44,4 +44,5 @@ class Rigid:
         error = ModelError(self._parameters.model_error_mm, self._parameters.model_error_length_mm)
         motion = BasisMotion(model.mesh.nodes)
         found = placed(model, observations, Seen(model, observations, error), motion)
-        return outcome(model, observations.frame, motion, found.fit, motion.radius_mm, found.ambiguous)
+        positions, spread = motion.positions(found.fit.state), posterior_spread(motion, found.fit)
+        return outcome(model, observations.frame, positions, spread, found.fit.weights, found.ambiguous)

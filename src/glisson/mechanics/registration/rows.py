@@ -37,22 +37,24 @@ class Rows:
 
     def squares(self, count: int) -> FloatArray:
         """Sum of the squares of the whitened gaps of each of `count` observed points."""
-        return np.bincount(self.point, self.residuals**2, minlength=count)
+        squares: FloatArray = np.bincount(self.point, self.residuals**2, minlength=count)
+        return squares
 
 
 def joined(parts: Sequence[Rows]) -> Rows:
-    """All rows in one, in order. Points with fewer nodes than others get nodes of no weight."""
+    """All rows in one, in order. Points with fewer nodes than others get their last one again, without weight."""
     widest = max(part.nodes.shape[1] for part in parts)
 
-    def wide(array: FloatArray | IntArray) -> FloatArray | IntArray:
-        return np.pad(array, ((0, 0), (0, widest - array.shape[1])))
-
     return Rows(
-        nodes=np.concatenate([wide(part.nodes) for part in parts]).astype(np.int64),
-        weights=np.concatenate([wide(part.weights) for part in parts]).astype(np.float64),
+        nodes=np.concatenate([np.pad(part.nodes, _missing(part, widest), mode="edge") for part in parts]),
+        weights=np.concatenate([np.pad(part.weights, _missing(part, widest)) for part in parts]),
         directions=np.concatenate([part.directions for part in parts]),
         gaps_mm=np.concatenate([part.gaps_mm for part in parts]),
         sigma_mm=np.concatenate([part.sigma_mm for part in parts]),
         point=np.concatenate([part.point for part in parts]),
         robust=np.concatenate([part.robust for part in parts]),
     )
+
+
+def _missing(part: Rows, widest: int) -> tuple[tuple[int, int], tuple[int, int]]:
+    return (0, 0), (0, widest - part.nodes.shape[1])

@@ -32,6 +32,9 @@ class ModelError:
 class Match(Protocol):
     """One observation, held against the model."""
 
+    groups: IntArray
+    """Nodes (k, a) that its rows may have in common, beside those of one element."""
+
     def rows(self, positions: FloatArray, first: int) -> Rows:
         """Its rows, with the nodes at `positions` (n, 3); its points are numbered from `first`."""
 
@@ -61,6 +64,11 @@ class Seen:
             else:
                 self._matches.append(SurfaceMatch(item.points_mm, covariance, places.surface(item.name)))
 
+    @property
+    def groups(self) -> list[IntArray]:
+        """Nodes (k, a) that rows may have in common, beside those of one element."""
+        return [match.groups for match in self._matches if len(match.groups)]
+
     def rows(self, positions: FloatArray) -> Rows:
         """All rows, with the nodes at `positions` (n, 3)."""
         parts = zip(self._matches, self._firsts, strict=True)
@@ -72,6 +80,7 @@ class SurfaceMatch:
 
     def __init__(self, points_mm: FloatArray, covariance_mm2: FloatArray, triangles: IntArray) -> None:
         self._points, self._covariance, self._triangles = points_mm, covariance_mm2, triangles
+        self.groups = np.zeros((0, 1), dtype=np.int64)
 
     def rows(self, positions: FloatArray, first: int) -> Rows:
         """See `Match`."""
@@ -91,6 +100,7 @@ class PointMatch:
 
     def __init__(self, points_mm: FloatArray, covariance_mm2: FloatArray, place: MaterialPoints) -> None:
         self._points, self._place = points_mm, place
+        self.groups = place.nodes
         values, self._axes = np.linalg.eigh(covariance_mm2)
         self._sigma = np.sqrt(values)
 
@@ -114,6 +124,7 @@ class CurveMatch:
 
     def __init__(self, points_mm: FloatArray, covariance_mm2: FloatArray, curve: MaterialCurve) -> None:
         self._points, self._covariance, self._curve = points_mm, covariance_mm2, curve
+        self.groups = curve.points.nodes[curve.segments].reshape(len(curve.segments), -1)
 
     def rows(self, positions: FloatArray, first: int) -> Rows:
         """See `Match`: two rows for each, across the curve; beyond its ends the nearest end."""

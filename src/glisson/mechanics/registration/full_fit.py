@@ -1,0 +1,130 @@
+"""All nodes free: strain energy against what was seen, minimised by Newton's method on the whole mesh."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse.linalg import LinearOperator, eigsh
+
+from glisson.core.arrays import FloatArray
+from glisson.core.errors import StageFailed
+from glisson.core.model import Model
+from glisson.core.status import Status
+from glisson.mechanics.elasticity import Elasticity
+from glisson.mechanics.linear_solvers import make_direct_solver
+from glisson.mechanics.pattern import FreeSystem, Stiffness, block_pattern
+from glisson.mechanics.registration.outliers import CUTS, judged
+from glisson.mechanics.registration.rows import Rows
+from glisson.mechanics.registration.seen import Seen
+
+_ITERATIONS = 60
+_AT_REST = 1e-4
+_SHORTEST = 1e-4
+_HOLDING = 1e-6
+"""Stiffness per node (1/mm²) that keeps the matrix regular where nothing holds a rigid motion."""
+
+
+@dataclass(frozen=True, eq=False)
+class FullState:
+    """Node positions (n, 3), what was seen there, how much each observed point counts (p,), and the cost."""
+
+    positions: FloatArray
+    rows: Rows
+    weights: FloatArray
+    cost: float
+
+
+class FullFit:
+    """The fit of one model to what was seen.
+
+    Args:
+        model: the organ.
+        seen: against it.
+        energy_uj: strain energy that costs as much as a residual of √2 standard deviations.
+    """
+
+    def __init__(self, model: Model, seen: Seen, energy_uj: float) -> None:
+        mesh = model.mesh
+        self._seen, self._energy_uj = seen, energy_uj
+        self._elasticity = Elasticity(mesh, model.materials, mesh.nodes)
+        self._pattern = block_pattern(mesh.tetrahedra, len(mesh.nodes)).with_groups(seen.groups)
+        self._system = FreeSystem(self._pattern, np.zeros((len(mesh.nodes), 3), dtype=np.bool_))
+        self._solver = make_direct_solver()
+
+    def fit(self, positions: FloatArray) -> FullState:
+        """Node positions of least cost near to `positions` (n, 3).
+
+        Raises:
+            StageFailed: it does not come to rest.
+        """
+        for cut in CUTS:
+            found = self._descend(positions, cut)
+            positions = found.positions
+        return found
+
+    def posterior_spread(self, found: FullState, modes: int) -> FloatArray:
+        """The least certain ways to move (n, 3, modes), each by one standard deviation."""
+        if not self._solver.factor(self._hessian(found, project=True)):
+            raise StageFailed("How sure the registration is cannot be told.", Status.SINGULAR)
+        size = found.positions.size
+
+        def back(load: FloatArray) -> FloatArray:
+            answer: FloatArray = self._solved(load.reshape(-1, 3)).ravel()
+            return answer
+
+        values, vectors = eigsh(LinearOperator((size, size), matvec=back, dtype=np.float64), k=modes, v0=np.ones(size))
+        spread: FloatArray = (vectors * np.sqrt(np.maximum(values, 0.0))).reshape(-1, 3, modes)
+        return spread
+
+    def close(self) -> None:
+        """Give the factor's memory back."""
+        self._solver.close()
+
+    def _descend(self, positions: FloatArray, cut: float) -> FullState:
+        here = self._at(positions, cut)
+        for _ in range(_ITERATIONS):
+            gradient = self._gradient(here)
+            if not self._solver.factor(self._hessian(here, project=True)):
+                raise StageFailed("Nothing holds the organ.", Status.SINGULAR)
+            step = self._solved(-gradient)
+            promised = -float((gradient * step).sum())
+            share = 1.0
+            there = self._at(here.positions + step, cut)
+            while there.cost > here.cost - 1e-4 * share * promised and share > _SHORTEST:
+                share *= 0.5
+                there = self._at(here.positions + share * step, cut)
+            gained = here.cost - there.cost
+            if gained > 0.0:
+                here = there
+            if gained < _AT_REST:
+                return here
+        raise StageFailed("The organ does not come to rest on what was seen.", Status.ITERATION_LIMIT)
+
+    def _at(self, positions: FloatArray, cut: float) -> FullState:
+        rows = self._seen.rows(positions)
+        judgement = judged(rows, self._seen.count, cut)
+        energy = self._elasticity.energy(positions) / self._energy_uj
+        return FullState(positions, rows, judgement.weights, judgement.cost + energy)
+
+    def _gradient(self, here: FullState) -> FloatArray:
+        rows = here.rows
+        pull = (here.weights[rows.point] * rows.residuals / rows.sigma_mm)[:, None] * rows.directions
+        gradient = self._elasticity.forces(here.positions) / self._energy_uj
+        np.add.at(gradient, rows.nodes, -rows.weights[:, :, None] * pull[:, None])
+        return gradient
+
+    def _hessian(self, here: FullState, project: bool) -> Stiffness:
+        blocks = np.zeros((self._pattern.block_count, 3, 3))
+        self._elasticity.add_stiffness(here.positions, self._pattern, blocks, project)
+        blocks /= self._energy_uj
+        rows = here.rows
+        scaled = rows.directions * (np.sqrt(here.weights[rows.point]) / rows.sigma_mm)[:, None]
+        outer = np.einsum("ra,rb,ri,rj->rabij", rows.weights, rows.weights, scaled, scaled)
+        self._pattern.add_groups(rows.nodes, outer, blocks)
+        self._pattern.add_diagonal(np.full(len(here.positions), _HOLDING), blocks)
+        return Stiffness(self._pattern, self._system, blocks, here.positions)
+
+    def _solved(self, load: FloatArray) -> FloatArray:
+        answer = self._solver.solve(load, 1e-8)
+        if answer is None:
+            raise StageFailed("Nothing holds the organ.", Status.SINGULAR)
+        return answer

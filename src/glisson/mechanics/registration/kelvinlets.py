@@ -1,0 +1,93 @@
+"""Technique "kelvinlets": the organ deforms as endless elastic tissue does under blunt forces."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from glisson.core.arrays import FloatArray
+from glisson.core.model import Model
+from glisson.core.observations import Observations
+from glisson.core.protocols import Progress, silent
+from glisson.core.registered import Registered
+from glisson.geometry.quadratic import straight_boundary
+from glisson.geometry.spreading import evenly_spread
+from glisson.mechanics.registration.basis import ElasticModes, elastic_modes
+from glisson.mechanics.registration.checks import check_observations
+from glisson.mechanics.registration.elastic_fit import elastic_fit
+from glisson.mechanics.registration.motion import BasisMotion
+from glisson.mechanics.registration.seen import ModelError
+
+
+@dataclass(frozen=True)
+class KelvinletsParameters:
+    """Of the Kelvinlets.
+
+    `centres` is the number of places on the surface at which forces act; `radius_mm` how blunt they are;
+    `energy_uj_per_kpa` how much energy is expected per unknown, at a Young's modulus of 1 kPa; the model's error in mm,
+    over which length (mm) alike.
+    """
+
+    centres: int = 45
+    radius_mm: float = 30.0
+    energy_uj_per_kpa: float = 2000.0
+    model_error_mm: float = 1.0
+    model_error_length_mm: float = 10.0
+
+
+class Kelvinlets:
+    """Regularised Kelvinlets (de Goes and James 2017), superposed as by Ringel et al. 2022."""
+
+    name: ClassVar[str] = "kelvinlets"
+    summary: ClassVar[str] = "blunt forces in endless elastic tissue; needs no mesh but places"
+    Parameters: ClassVar[type[KelvinletsParameters]] = KelvinletsParameters
+
+    def __init__(self, parameters: KelvinletsParameters) -> None:
+        self._parameters = parameters
+
+    @classmethod
+    def missing_dependencies(cls) -> tuple[str, ...]:
+        """Nothing beyond the core."""
+        return ()
+
+    def register(self, model: Model, observations: Observations, progress: Progress = silent) -> Registered:
+        """See `Registration`."""
+        check_observations(model, observations)
+        chosen = self._parameters
+        modes = kelvinlet_modes(model, chosen.centres, chosen.radius_mm)
+        softest = min(material.young_modulus_kpa for material in model.materials.values())
+        precision = np.diag(2.0 * modes.energies_uj / (chosen.energy_uj_per_kpa * softest))
+        motion = BasisMotion(model.mesh.nodes, modes.basis, precision)
+        error = ModelError(chosen.model_error_mm, chosen.model_error_length_mm)
+        return elastic_fit(model, observations, motion, error, progress)
+
+
+def kelvinlet_modes(model: Model, count: int, radius_mm: float) -> ElasticModes:
+    """Displacements by forces at places of the surface, and the work that these do."""
+    nodes = model.mesh.nodes
+    surface = np.unique(straight_boundary(model.mesh)[0])
+    centres = nodes[surface[evenly_spread(nodes[surface], count)]]
+    material = min(model.materials.values(), key=lambda one: one.young_modulus_kpa)
+    shear, ratio = material.shear_modulus_kpa, material.poisson_ratio
+    work = kelvinlets(centres, centres, radius_mm, shear, ratio)
+    basis = kelvinlets(nodes, centres, radius_mm, shear, ratio)
+    size = 3 * len(centres)
+    return elastic_modes(
+        basis.transpose(0, 2, 1, 3).reshape(len(nodes), 3, size), work.transpose(0, 2, 1, 3).reshape(size, size)
+    )
+
+
+def kelvinlets(
+    points_mm: FloatArray, centres_mm: FloatArray, radius_mm: float, shear_kpa: float, ratio: float
+) -> FloatArray:
+    """Displacement (n, c, 3, 3) in mm at points (n, 3) by each unit force (1 mN) at centres (c, 3).
+
+    de Goes and James 2017, equation 6, of a force spread over about `radius_mm`.
+    """
+    arms = points_mm[:, None] - centres_mm[None]
+    reach = np.sqrt((arms**2).sum(axis=2) + radius_mm**2)[:, :, None, None]
+    a = 1.0 / (4.0 * np.pi * shear_kpa)
+    b = a / (4.0 * (1.0 - ratio))
+    outer = arms[:, :, :, None] * arms[:, :, None, :]
+    result: FloatArray = ((a - b) / reach + 0.5 * a * radius_mm**2 / reach**3) * np.eye(3) + b / reach**3 * outer
+    return result
