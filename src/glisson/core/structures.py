@@ -1,6 +1,8 @@
 """What lies inside the organ and moves with it: tumours, vessels, duct, wire, planes (LPS mm)."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -106,17 +108,20 @@ class Tumour:
 class Structures:
     """Everything embedded in the organ. `duct` is the bile duct's centreline from its mouth inward.
 
-    The wire of fixed length lies in the duct; `wire_length_mm` of it are inside, measured from the mouth.
+    The wire of fixed length lies in the duct; `wire_length_mm` of it are inside, measured from the mouth. `curves` are
+    other lines by name that can be seen during surgery, such as the falciform ligament's on the surface.
     """
 
     tumours: tuple[Tumour, ...] = ()
     trees: tuple[VesselTree, ...] = ()
     duct: Curve | None = None
     wire_length_mm: float | None = None
+    curves: Mapping[str, Curve] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        names = [tumour.name for tumour in self.tumours] + [tree.name for tree in self.trees]
+        object.__setattr__(self, "curves", MappingProxyType(dict(self.curves)))
+        names = [tumour.name for tumour in self.tumours] + [tree.name for tree in self.trees] + list(self.curves)
         if len(set(names)) != len(names):
-            raise BadInput(f"Tumours and vessel trees need different names, not {names}.")
+            raise BadInput(f"Tumours, vessel trees and curves need different names, not {names}.")
         if (self.wire_length_mm is None) != (self.duct is None):
             raise BadInput("A wire needs a duct to lie in, and a duct a wire length (the whole duct if unknown).")

@@ -111,6 +111,7 @@ def _structures_table(structures: Structures) -> dict[str, Any]:
         "trees": [tree_table(tree) for tree in structures.trees],
         "duct_mm": structures.duct.points_mm if structures.duct else None,
         "wire_length_mm": structures.wire_length_mm,
+        "curves_mm": {name: curve.points_mm for name, curve in structures.curves.items()},
     }
 
 
@@ -121,7 +122,12 @@ def _structures(record: Record) -> Structures:
             trees=tuple(tree_of_table(entry) for entry in record.records("trees")),
             duct=Curve(record.floats("duct_mm", -1, 3)) if record.has("duct_mm") else None,
             wire_length_mm=record.number_or_none("wire_length_mm"),
+            curves=_curves(record.record("curves_mm")) if record.has("curves_mm") else {},
         )
+
+
+def _curves(record: Record) -> dict[str, Curve]:
+    return {key: Curve(record.floats(key, -1, 3)) for key in record.keys()}  # noqa: SIM118  # no dict
 
 
 def _tumour(record: Record) -> Tumour:

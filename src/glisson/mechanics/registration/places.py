@@ -59,14 +59,15 @@ class Places:
         return MaterialPoints(nodes[None, :], np.full((1, len(nodes)), 1.0 / len(nodes)))
 
     def curve(self, name: str) -> MaterialCurve:
-        """The wire's duct ("wire", "duct"), a vessel tree, or the edges of the surface within a node set.
+        """A named curve, the wire's duct ("wire", "duct"), a vessel tree, or the surface's edges within a node set.
 
         Raises:
             BadInput: there is none of that name.
         """
         structures = self._model.structures
-        if name in ("wire", "duct") and structures.duct is not None:
-            points = structures.duct.points_mm
+        line = structures.duct if name in ("wire", "duct") else structures.curves.get(name)
+        if line is not None:
+            points = line.points_mm
             return MaterialCurve(self.located(points), _chain(len(points)))
         for tree in structures.trees:
             if tree.name == name:

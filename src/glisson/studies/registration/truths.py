@@ -1,0 +1,70 @@
+"""How the twin's livers are deformed: by finite elements once for each liver, or in closed form."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from glisson.core.errors import StageFailed
+from glisson.core.mesh import TetMesh
+from glisson.core.status import Status
+from glisson.geometry.mapping import PointMap
+from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
+from glisson.phantom.proportions import draw_proportions
+from glisson.phantom.sparse_data.case import Carry, SparseCase, bend_of, make_case
+from glisson.phantom.sparse_data.design import CaseDesign
+from glisson.phantom.sparse_data.liver import build_sparse_liver
+from glisson.phantom.sparse_data.packing import draw_packing, packed
+from glisson.studies.meshing import member_mesh
+from glisson.studies.point import Outcome, Point, Task
+from glisson.studies.store import read_arrays
+
+PACKAGES = ("glisson.core", "glisson.geometry", "glisson.phantom", "glisson.studies.meshing")
+"""Ours on whose source every point of the twin rests."""
+
+PACK = Task(f"{__name__}:pack_liver", (*PACKAGES, "glisson.mechanics", "glisson.preoperative.meshing", __name__))
+
+TRUTH_EDGE_MM = 14.0
+"""Some 10,000 quadratic elements, where the models under test are coarser and may be linear."""
+
+
+def truth_point(seed: int, member: int, packings: int, edge_mm: float = TRUTH_EDGE_MM) -> Point:
+    """The point that packs one liver in so many ways."""
+    return Point(PACK, {"seed": seed, "member": member, "packings": packings, "edge_mm": edge_mm}, cost=packings + 0.6)
+
+
+def pack_liver(inputs: Mapping[str, Any], folder: Path) -> Outcome:
+    """Displacements (packings, n, 3) in mm of one T10 mesh of a liver."""
+    member, liver = inputs["member"], build_sparse_liver(inputs["member"])
+    mesh = member_mesh(draw_proportions(member), inputs["edge_mm"]).as_quadratic()
+    found = []
+    for number in range(inputs["packings"]):
+        model, scenario = packed(draw_packing(inputs["seed"], member, number), mesh, liver)
+        deformation = QuasiStatic(QuasiStaticParameters()).solve(model, scenario)
+        if deformation.status is not Status.CONVERGED:
+            raise StageFailed(f"Liver {member}, packing {number}: {deformation.message}", deformation.status)
+        found.append(deformation.displacement)
+    arrays = {"nodes": mesh.nodes, "tetrahedra": mesh.tetrahedra, "displacements": np.array(found)}
+    return Outcome({"elements": len(mesh.tetrahedra)}, arrays)
+
+
+def build_case(design: CaseDesign, folder: Path, truth: str | None) -> SparseCase:
+    """A case of the twin.
+
+    Args:
+        design: which.
+        folder: of the study's points.
+        truth: the key of the point that packed its liver; not needed by a case in closed form.
+
+    Raises:
+        OSError: that point's file is missing or damaged.
+    """
+    liver = build_sparse_liver(design.member)
+    return make_case(design, liver, bend_of(design, liver).forward if truth is None else _carry(design, folder, truth))
+
+
+def _carry(design: CaseDesign, folder: Path, truth: str) -> Carry:
+    arrays = read_arrays(folder, truth)
+    mesh = TetMesh(arrays["nodes"], arrays["tetrahedra"])
+    return PointMap(mesh, arrays["displacements"][design.deformation]).forward
