@@ -90,7 +90,7 @@ def test_a_view_that_moved_is_told():
     views[3] = HandEyeView(views[3].board, moved(still, lambda matrix: matrix + 3.0 * ALONG))
     assert any(note.startswith("view 4 fits worse") for note in calibrate_hand_eye(CAMERA, views).notes)
     views[3] = HandEyeView(views[3].board, moved(still, lambda matrix: matrix + 40.0 * ALONG))
-    with pytest.raises(StageFailed, match="^view 4 does not fit the other views"):
+    with pytest.raises(StageFailed, match=r"^view 4 does not fit the other views"):
         calibrate_hand_eye(CAMERA, views)
 
 
