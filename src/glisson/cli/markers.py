@@ -6,13 +6,14 @@ from pathlib import Path
 from glisson.cli.command import Command
 from glisson.cli.console import Answer
 from glisson.cli.progress import StageLines
+from glisson.core.status import Status
 from glisson.framework.instruments import library_or_example
 from glisson.framework.marker_sheets import board_sheet, cross_sheets, wheel_sheet
 from glisson.intraoperative.cameras.boards import board_from_text
 from glisson.io.layout_files import read_layout
 from glisson.io.true_scale_pdf import SENTENCE, Sheet, write_true_scale_pdf
 
-_KEYS = ("file", "pages", "papers")
+_KEYS = ("status", "message", "file", "pages", "papers")
 
 
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,7 +38,10 @@ def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
     sheets = _sheets(arguments)
     papers = write_true_scale_pdf(file, sheets)
     listed = [f"{sheet.title} on {paper}" for sheet, paper in zip(sheets, papers, strict=True)]
-    values = {"file": str(file), "pages": len(sheets), "papers": list(papers)}
+    values = {
+        "status": Status.CONVERGED, "message": Status.CONVERGED.sentence,
+        "file": str(file), "pages": len(sheets), "papers": list(papers),
+    }  # fmt: skip
     return Answer(values, "\n".join([*listed, SENTENCE, f"written   {file}"]))
 
 
