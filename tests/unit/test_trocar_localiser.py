@@ -66,6 +66,20 @@ def test_a_room_in_use_is_right_or_flagged(localiser):
     assert good >= 5
 
 
+def test_what_the_bounds_do_not_count_is_told(localiser):
+    places = tuple(
+        replace(cross, room_from_cross=replace(cross.room_from_cross, covariance=1e-6 * np.eye(6)))
+        for cross in trocar_views.layout().crosses
+    )
+    layout, camera = CrossLayout(places), replace(CAMERA, covariance=1e-8 * np.eye(9))
+    image = trocar_views.view(layout, trocar_views.pose(2), 2)
+    assert localiser.localise(image, camera, layout).notes == ()
+    told = localiser.localise(image, CAMERA, trocar_views.layout()).notes
+    assert [note.partition(" no covariance")[0] for note in told] == ["The camera has", "The crosses' places have"]
+    other_lens = localiser.localise(image, replace(camera, distortion=np.zeros(5)), layout)
+    assert "times as far off as they should be" in other_lens.notes[0]
+
+
 def test_ink_that_has_grown_is_told_from_a_pose_that_is_off(localiser):
     layout, true = trocar_views.layout(), trocar_views.pose(2)
     noises, counts = [], []

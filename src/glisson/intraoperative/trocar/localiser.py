@@ -32,6 +32,9 @@ _REACHES_PX = (5.0, 3.0, 3.0)
 _MISFIT = 2.0
 """With residuals this many times as large as they should be, another size of the crosses is tried."""
 
+_UNUSUAL = 1.5
+"""Residuals this many times as large as they should be are told; those of good cameras and layouts came to 1.4."""
+
 
 @dataclass(frozen=True)
 class LocaliserParameters:
@@ -109,6 +112,7 @@ class CrossLocaliser(ABC):
             found.bound_mm,
             found.bound_rad,
             float(np.sqrt(np.median(variance)) * camera.focal_px.mean() * found.scale),
+            _notes(found, camera, layout),
         )
 
     def _status(self, found: FoundPose) -> tuple[Status, str]:
@@ -132,6 +136,24 @@ class CrossLocaliser(ABC):
 def _of_trocar(camera_from_room: RigidTransform) -> RigidTransform:
     pose = camera_from_room.inverse()
     return RigidTransform("room", "trocar", pose.rotation, pose.translation_mm, pose.covariance)
+
+
+def _notes(found: FoundPose, camera: Camera, layout: CrossLayout) -> tuple[str, ...]:
+    notes = []
+    if camera.covariance is None:
+        notes.append(
+            "The camera has no covariance and is taken as exact: the bounds do not count what its calibration leaves open."
+        )
+    if any(cross.room_from_cross.covariance is None for cross in layout.crosses):
+        notes.append(
+            "The crosses' places have no covariance and are taken as exact: the bounds do not count how they were hung."
+        )
+    if found.scale > _UNUSUAL:
+        notes.append(
+            f"The corners are {found.scale:.1f} times as far off as they should be, so the pose may err by more than "
+            "the bounds: is it this camera, with this lens and focus, and do the crosses hang where the layout says?"
+        )
+    return tuple(notes)
 
 
 def _refusal(reading: Reading, layout: CrossLayout) -> Localisation | None:
