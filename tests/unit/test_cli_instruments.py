@@ -60,6 +60,15 @@ def test_the_instrument_of_a_picture(tmp_path: Path, glisson: Glisson, views: Wh
     assert np.linalg.norm(np.array(said["tip_mm"]) - true) < 4.0 * np.sqrt(np.trace(said["tip_covariance_mm2"]))
     assert said["room"] is None
     assert read_photograph(said["picture"]).shape == (960 + 64, 1280, 3)
+    assert glisson("instruments", "add", "hook", "--library", tmp_path / "one.toml", "--length-mm", "330")[0] == 0
+    words = ["instruments", "recognise", tmp_path / "view.png", "--trocar", EXAMPLE_TROCAR]
+    code, said = glisson(*words, "--library", tmp_path / "one.toml")
+    assert (code, said["status"]) == (2, "bad_input"), said
+    for place, sentence in (("view.png", "would be overwritten"), ("seen.jpg", "ends in .png")):
+        code, said = glisson(*words, "--out", tmp_path / place)
+        assert code == 2
+        assert sentence in said["message"]
+    assert read_photograph(tmp_path / "view.png").shape == (960, 1280, 3)
 
 
 @pytest.mark.parametrize(
@@ -159,6 +168,8 @@ def test_markers_are_printed(tmp_path: Path, glisson: Glisson) -> None:
     assert (code, said["pages"] % 5) == (0, 0)
     code, said = glisson("markers", "board", "charuco:19x26:5:4:4X4_250", "--out", tmp_path / "board.pdf")
     assert (code, said["papers"]) == (0, ["A4"])
+    code, said = glisson("markers", "board", "chessboard:9x6:20", "--out", tmp_path / "board.jpg")
+    assert (code, said["status"]) == (2, "bad_input")
     code, said = glisson("markers", "board", "chessboard:9x6:90", "--out", tmp_path / "board.pdf")
     assert (code, said["status"]) == (2, "bad_input")
     assert "does not fit on A3" in said["message"]

@@ -53,6 +53,11 @@ def test_a_session_from_pictures_alone(tmp_path, table, glisson):
     ball = (radius < 43.0) & (surface.points_mm[:, 2] > 5.0)
     assert np.median(np.abs(radius[ball] - 40.0)) < 0.6
     assert (tmp_path / "seen" / "views.png").is_file()
+    (folder / "view1.png").rename(folder / "views.png")
+    table["views"][0]["image"] = "views.png"
+    code, said = glisson("reconstruct", write_session(folder, table))
+    assert code == 2
+    assert "would be overwritten" in said["message"]
 
 
 def test_a_direction_without_roll_will_do(tmp_path, table, glisson):

@@ -110,10 +110,27 @@ def test_commands(hung, tmp_path, capfd):
     write_layout(tmp_path / "true.toml", true)
     given += ["--layout", str(tmp_path / "true.toml"), "--out", str(tmp_path / "seen.png"), "--json"]
     assert main(["localize", names[0], *given]) == 0
-    told = json.loads(capfd.readouterr().out)
+    said = capfd.readouterr()
+    assert "localize  running" in said.err
+    told = json.loads(said.out)
     assert told["status"] == "converged"
     assert np.array(told["covariance"]).shape == (6, 6)
     assert read_photograph(tmp_path / "seen.png").shape == (544, 640, 3)
+    assert len(told["notes"]) == 2
+    given[-2] = names[0]
+    before = (tmp_path / "view0.png").read_bytes()
+    assert main(["localize", names[0], *given]) == 2
+    assert "would be overwritten" in json.loads(capfd.readouterr().out)["message"]
+    assert (tmp_path / "view0.png").read_bytes() == before
+    given[-2] = str(tmp_path / "seen.jpg")
+    assert main(["localize", names[0], *given]) == 2
+    assert "ends in .png" in json.loads(capfd.readouterr().out)["message"]
+    assert main([
+        "layout", "survey", *names, *given[:2], "--layout", given[3], "--distance", "cross 2,cross 4,1000", "--out",
+        names[3], "--json",
+    ]) == 2  # fmt: skip
+    assert "would be overwritten" in json.loads(capfd.readouterr().out)["message"]
+    given[-2] = str(tmp_path / "seen.png")
     write_photograph(tmp_path / "mirrored.png", images[0][:, ::-1])
     assert main(["localize", str(tmp_path / "mirrored.png"), *given]) == 2
     told = json.loads(capfd.readouterr().out)

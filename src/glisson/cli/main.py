@@ -112,6 +112,7 @@ def _failure(error: BaseException, stage: str | None, command: Command | None) -
         message, exit_code = message or f"Interrupted{where}.", _INTERRUPTED
     elif isinstance(error, StageFailed):
         status = error.status
+        exit_code = 2 if status is Status.BAD_INPUT else 1
     elif isinstance(error, GlissonError):
         exit_code = error.exit_code
         status = Status.BAD_INPUT if isinstance(error, BadInput) else None

@@ -1,7 +1,6 @@
 """`glisson markers`: wheels of instruments, crosses and calibration boards as PDF at true scale."""
 
 import argparse
-from pathlib import Path
 
 from glisson.cli.command import Command
 from glisson.cli.console import Answer
@@ -11,6 +10,7 @@ from glisson.framework.instruments import library_or_example
 from glisson.framework.marker_sheets import board_sheet, cross_sheets, wheel_sheet
 from glisson.intraoperative.cameras.boards import board_from_text
 from glisson.io.layout_files import read_layout
+from glisson.io.result_places import result_place
 from glisson.io.true_scale_pdf import SENTENCE, Sheet, write_true_scale_pdf
 
 _KEYS = ("status", "message", "file", "pages", "papers")
@@ -34,7 +34,8 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
-    file = Path(arguments.out or f"{arguments.kind}.pdf")
+    read = (vars(arguments).get("layout"), vars(arguments).get("library"))
+    file = result_place(arguments.out or f"{arguments.kind}.pdf", read, ".pdf")
     sheets = _sheets(arguments)
     papers = write_true_scale_pdf(file, sheets)
     listed = [f"{sheet.title} on {paper}" for sheet, paper in zip(sheets, papers, strict=True)]
