@@ -68,6 +68,9 @@ def test_a_survey_finds_where_crosses_hang(hung):
     survey = survey_layout(images, CAMERA, designed, Distance("cross 2", "cross 4", length, 0.5))
     assert survey.size_factor == pytest.approx(1.005, abs=4.0 * survey.size_sigma)
     assert survey.size_sigma < 0.002
+    assert survey.notes == ()
+    wrong = survey_layout(images, CAMERA, designed, Distance("cross 2", "cross 4", 1.05 * length, 0.5))
+    assert "1.05" in wrong.notes[0]
     count = len(true)
     moved = in_frame_of(
         [cross.room_from_cross for cross in designed.crosses],
@@ -87,6 +90,8 @@ def test_what_a_survey_cannot_do(hung):
         survey_layout(images[:1], CAMERA, designed, Distance("cross 1", "cross 2", 1000.0))
     with pytest.raises(BadInput, match="between two of the crosses"):
         survey_layout(images, CAMERA, designed, Distance("cross 1", "door", 1000.0))
+    with pytest.raises(BadInput, match="mm apart, not 1.7 mm; give the measured distance of their middles in mm"):
+        survey_layout(images, CAMERA, designed, Distance("cross 2", "cross 4", 1.7))
     with pytest.raises(BadInput, match="positive"):
         survey_layout(images, CAMERA, designed, Distance("cross 1", "cross 2", float("nan")))
 

@@ -142,7 +142,7 @@ def _notes(found: FoundPose, camera: Camera, layout: CrossLayout) -> tuple[str, 
     notes = []
     if camera.covariance is None:
         notes.append(
-            "The camera has no covariance and is taken as exact: the bounds do not count what its calibration leaves open."
+            "The camera has no covariance and is taken as exact: the bounds do not count how well it is known."
         )
     if any(cross.room_from_cross.covariance is None for cross in layout.crosses):
         notes.append(
