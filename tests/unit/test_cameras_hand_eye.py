@@ -257,6 +257,14 @@ def test_geometry_of_an_oblique_scope():
     assert exact.tip_mm == pytest.approx(tip_in_camera, abs=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("tip_mm", "sentence"), [((0.0, 3.0, -630.0), "630 mm behind"), ((90.0, 0.0, 5.0), "90 mm be")]
+)
+def test_a_tip_where_no_scope_has_it_is_refused(tip_mm, sentence):
+    with pytest.raises(BadInput, match=sentence):
+        scope_geometry(CAMERA_FROM_MARKER, CAMERA_FROM_MARKER.inverse().apply(tip_mm), np.zeros((3, 3)), None)
+
+
 def test_a_scope_hardly_spun_or_swung_is_refused():
     still = [RigidTransform("room", "marker", np.eye(3), np.zeros(3))] * 8
     with pytest.raises(StageFailed, match="spin it"):
