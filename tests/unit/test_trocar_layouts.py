@@ -90,7 +90,7 @@ def test_what_a_survey_cannot_do(hung):
         survey_layout(images[:1], CAMERA, designed, Distance("cross 1", "cross 2", 1000.0))
     with pytest.raises(BadInput, match="between two of the crosses"):
         survey_layout(images, CAMERA, designed, Distance("cross 1", "door", 1000.0))
-    with pytest.raises(BadInput, match="mm apart, not 1.7 mm; give the measured distance of their middles in mm"):
+    with pytest.raises(BadInput, match=r"mm apart, not 1.7 mm; give the measured distance of their middles in mm"):
         survey_layout(images, CAMERA, designed, Distance("cross 2", "cross 4", 1.7))
     with pytest.raises(BadInput, match="positive"):
         survey_layout(images, CAMERA, designed, Distance("cross 1", "cross 2", float("nan")))
