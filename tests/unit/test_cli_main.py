@@ -169,3 +169,10 @@ def test_a_closed_pipe_is_no_trouble() -> None:
     command = f"{sys.executable} -m glisson.cli.main --help | true; exit ${{PIPESTATUS[0]}}"
     ended = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
     assert "Traceback" not in ended.stderr
+
+
+@pytest.mark.parametrize(("words", "code"), [("--version", 0), ("paint --json", 2)])
+def test_a_closed_stdout_is_no_trouble(words: str, code: int) -> None:
+    command = f"{sys.executable} -m glisson.cli.main {words} >&-"
+    ended = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
+    assert (ended.returncode, "Traceback" in ended.stderr) == (code, False), ended.stderr

@@ -77,7 +77,7 @@ def plane_of(track: TipTrack, towards: FloatArray) -> DrawnPlane:
     covariance = np.asarray(np.linalg.inv(information) * max(misfit, 1.0), dtype=np.float64)
     covariance[2, 2] += 1.0 / float(np.mean(1.0 / variances))
     drawn = DrawnPlane(plane, covariance, float(np.sqrt(np.mean(off**2))), misfit)
-    across_deg = float(np.degrees(np.arcsin(min(abs(towards @ plane.normal), 1.0))))
+    across_deg = float(np.degrees(np.arcsin(min(abs(float(towards @ plane.normal)), 1.0))))
     if drawn.status.is_good and across_deg < max(_ACROSS_DEG, _SIGMAS * np.degrees(drawn.tilt_sigma_rad)):
         raise BadInput(
             f"The direction to the removed side is {across_deg:.1f}° off the drawn plane, which is known to "
