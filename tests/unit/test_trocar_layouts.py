@@ -87,6 +87,8 @@ def test_a_survey_finds_where_crosses_hang(hung):
 def test_what_a_survey_cannot_do(hung):
     designed, _, images = hung
     with pytest.raises(StageFailed, match="is not seen beside another in two images"):
+        survey_layout([images[0], np.zeros_like(images[0])], CAMERA, designed, Distance("cross 1", "cross 2", 1000.0))
+    with pytest.raises(BadInput, match="two images at least"):
         survey_layout(images[:1], CAMERA, designed, Distance("cross 1", "cross 2", 1000.0))
     with pytest.raises(BadInput, match="between two of the crosses"):
         survey_layout(images, CAMERA, designed, Distance("cross 1", "door", 1000.0))

@@ -109,6 +109,8 @@ def test_images_that_allow_no_pose(localiser):
     nothing = localiser.localise(np.zeros_like(image), CAMERA, layout)
     assert nothing.status is Status.UNOBSERVABLE
     assert "No cross" in nothing.message
+    grey = localiser.localise(np.repeat(image.mean(axis=2, keepdims=True).astype(np.uint8), 3, axis=2), CAMERA, layout)
+    assert "which is grey" in grey.message
     one = localiser.localise(image, CAMERA, CrossLayout(layout.crosses[:1]))
     assert one.status is Status.UNOBSERVABLE
     assert "Only one cross" in one.message
@@ -141,7 +143,9 @@ def test_a_layout_that_is_not_the_rooms_is_told(localiser):
 def test_an_image_of_another_camera_is_refused(localiser):
     layout = trocar_views.layout()
     for image in (np.zeros((240, 320, 3), dtype=np.uint8), np.zeros((480, 640), dtype=np.uint8)):
-        with pytest.raises(BadInput, match="its camera takes"):
+        with pytest.raises(
+            BadInput, match=r"(320 × 240 px|640 × 480 px and grey), but its camera takes colour images of 640 × 480 px"
+        ):
             localiser.localise(image, CAMERA, layout)
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +59,7 @@ def reconstruct_session(
     picture, file = (result_place(folder / name, read) for name in (PICTURE, OBSERVATIONS))
     progress(0.0, "reading the pictures")
     images = tuple(_image(view) for view in given.views)
+    _check_different(given, images)
     views, found_tips = _view_set(given, images, progress)
     draw_views(views, images, picture)
     progress(0.6, "reconstructing")
@@ -76,6 +78,12 @@ def _image(view: SessionView) -> NDArray[np.uint8] | None:
             f"{view.camera.width} × {view.camera.height}; give the picture as the camera took it."
         )
     return image
+
+
+def _check_different(session: ViewSession, images: Images) -> None:
+    for (one, first), (other, second) in combinations(zip(session.views, images, strict=True), 2):
+        if first is not None and second is not None and np.array_equal(first, second):
+            raise BadInput(f"{one.name} and {other.name} have the same picture; give each view its own.")
 
 
 def _view_set(session: ViewSession, images: Images, progress: Progress) -> tuple[ViewSet, tuple[str, ...]]:

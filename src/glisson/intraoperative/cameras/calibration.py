@@ -78,7 +78,7 @@ def calibrate_camera(views: Sequence[BoardView], width: int, height: int) -> Cam
         StageFailed: unobservable, or a view that does not fit, with a sentence on what to change.
     """
     if len(views) < 3:
-        raise BadInput(f"{len(views)} views of the board are too few to calibrate a camera; take 10 or more, tilted.")
+        raise BadInput(f"These are too few views to calibrate a camera ({len(views)}); take 10 or more, tilted.")
     _check_inside(views, width, height)
     check_repeated(views)
     seen = [Seen(view.points_mm, view.pixels, np.ones(len(view.pixels))) for view in views]

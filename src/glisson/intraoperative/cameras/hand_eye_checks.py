@@ -30,7 +30,7 @@ def check_views(views: Sequence[HandEyeView]) -> None:
         StageFailed: unobservable (poses nearly parallel).
     """
     if len(views) < 3:
-        raise BadInput(f"{len(views)} views are too few for a hand–eye calibration; take 10 or more.")
+        raise BadInput(f"These are too few views for a hand–eye calibration ({len(views)}); take 10 or more.")
     if len({view.room_from_base is None for view in views}) > 1:
         raise BadInput("The board's marker was tracked in some views only; give its poses for all of them or for none.")
     turned = turning([tracked(view).rotation.T for view in views])

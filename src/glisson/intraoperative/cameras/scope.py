@@ -45,7 +45,7 @@ def calibrate_shaft(room_from_marker: Sequence[RigidTransform]) -> Shaft:
     """
     if len(room_from_marker) < 5:
         raise BadInput(
-            f"{len(room_from_marker)} poses are too few to find the shaft; spin the scope through 20 or more."
+            f"These are too few poses to find the shaft ({len(room_from_marker)}); spin the scope through 20 or more."
         )
     rotations = np.stack([pose.rotation for pose in room_from_marker])
     turned = turning(list(rotations))

@@ -62,11 +62,11 @@ class CrossLocaliser(ABC):
         """See `glisson.core.protocols.Localiser`."""
         if image.shape != (camera.height, camera.width, 3) or image.dtype != np.uint8:
             raise BadInput(
-                f"The image is {' × '.join(map(str, image.shape))}, but its camera takes colour images of "
-                f"{camera.height} × {camera.width} px; give the camera that took it."
+                f"The image is {image.shape[1]} × {image.shape[0]} px{'' if image.ndim == 3 else ' and grey'}, but its "
+                f"camera takes colour images of {camera.width} × {camera.height} px; give the camera that took it."
             )
         reading = read_crosses(image, cross_outlines(image), layout)
-        if (refusal := _refusal(reading, layout)) is not None:
+        if (refusal := _refusal(reading, layout, grey=bool((image == image[:, :, :1]).all()))) is not None:
             return refusal
         count = len(reading.crosses)
         numbers = np.repeat([one.number for one in reading.crosses], 12).astype(np.int64)
@@ -123,11 +123,12 @@ class CrossLocaliser(ABC):
             return Status.AMBIGUOUS, (
                 f"A second pose, {apart:.0f} mm away, explains the crosses as well; show the camera more of them."
             )
-        limit_rad = np.deg2rad(self._parameters.angle_limit_deg)
-        if found.bound_mm > self._parameters.position_limit_mm or found.bound_rad > limit_rad:
+        limit_mm, limit_deg = self._parameters.position_limit_mm, self._parameters.angle_limit_deg
+        bound_deg = float(np.rad2deg(found.bound_rad))
+        if found.bound_mm > limit_mm or bound_deg > limit_deg:
             return Status.UNOBSERVABLE, (
-                f"The position may err by {found.bound_mm:.1f} mm and the orientation by "
-                f"{np.rad2deg(found.bound_rad):.2f}° in one of 10,000 cases, more than the limits; show the camera "
+                f"In one of 10,000 cases the position may err by {found.bound_mm:.2f} mm and the orientation by "
+                f"{bound_deg:.3f}°; the limits are {limit_mm:g} mm and {limit_deg:g}°. Show the camera "
                 "crosses that are farther apart."
             )
         return Status.CONVERGED, Status.CONVERGED.sentence
@@ -156,7 +157,7 @@ def _notes(found: FoundPose, camera: Camera, layout: CrossLayout) -> tuple[str, 
     return tuple(notes)
 
 
-def _refusal(reading: Reading, layout: CrossLayout) -> Localisation | None:
+def _refusal(reading: Reading, layout: CrossLayout, *, grey: bool) -> Localisation | None:
     """What is told where too little can be read for a pose."""
     if reading.mirrored > len(reading.crosses):
         return Localisation(
@@ -173,7 +174,8 @@ def _refusal(reading: Reading, layout: CrossLayout) -> Localisation | None:
             crosses=names,
             corners_px=reading.crosses[0].corners_px,
         )
-    return Localisation(Status.UNOBSERVABLE, f"No cross of the layout can be read in the image.{others}")
+    why = ", which is grey: crosses are told by their colours" if grey else ""
+    return Localisation(Status.UNOBSERVABLE, f"No cross of the layout can be read in the image{why}.{others}")
 
 
 def _count(foreign: int) -> str:

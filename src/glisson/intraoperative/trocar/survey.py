@@ -76,9 +76,11 @@ def survey_layout(
         distance: sets the scale.
 
     Raises:
-        BadInput: the distance names no cross, or cannot be that of the two.
+        BadInput: there are not two images, or the distance names no cross or cannot be that of the two.
         StageFailed: a cross is not seen often enough or not linked to the first.
     """
+    if len(images) < 2:
+        raise BadInput("A survey needs two images at least; take 20 or more, each cross in several of them.")
     names = [cross.name for cross in layout.crosses]
     if distance.first == distance.second or not {distance.first, distance.second} <= set(names):
         raise BadInput(f"The measured distance must be between two of the crosses {', '.join(names)}.")
