@@ -39,8 +39,9 @@ def check_repeated(views: Sequence[BoardView]) -> None:
                 repeated.append(f"{views[number].name} (as {name})")
                 break
     if repeated:
+        named = ", ".join(repeated[:8]) + (" …" if len(repeated) > 8 else "")
         raise BadInput(
-            f"The board is in the same place of the image again in {', '.join(repeated)}: such a view tells nothing "
+            f"The board is in the same place of the image again in {named}: such a view tells nothing "
             "new; leave it out, and move the board or the camera for each view."
         )
 
