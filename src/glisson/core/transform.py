@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from glisson.core.arrays import FloatArray, frozen_covariance, frozen_floats
 from glisson.core.errors import BadInput
@@ -44,6 +43,8 @@ class RigidTransform:
 
     def moved(self, step: FloatArray) -> "RigidTransform":
         """The transform after a step (6,) of d and e; without covariance."""
+        from scipy.spatial.transform import Rotation  # slow to load, and `--help` needs this module
+
         turn = Rotation.from_rotvec(step[:3]).as_matrix()
         return RigidTransform(self.target, self.source, turn @ self.rotation, self.translation_mm + step[3:])
 
