@@ -60,11 +60,13 @@ def build_case(design: CaseDesign, folder: Path, truth: str | None) -> SparseCas
     Raises:
         OSError: that point's file is missing or damaged.
     """
-    liver = build_sparse_liver(design.member)
-    return make_case(design, liver, bend_of(design, liver).forward if truth is None else _carry(design, folder, truth))
+    return make_case(design, build_sparse_liver(design.member), carry_of(design, folder, truth))
 
 
-def _carry(design: CaseDesign, folder: Path, truth: str) -> Carry:
+def carry_of(design: CaseDesign, folder: Path, truth: str | None) -> Carry:
+    """How a case is deformed; see `build_case`."""
+    if truth is None:
+        return bend_of(design, build_sparse_liver(design.member)).forward
     arrays = read_arrays(folder, truth)
     mesh = TetMesh(arrays["nodes"], arrays["tetrahedra"])
     return PointMap(mesh, arrays["displacements"][design.deformation]).forward
