@@ -16,7 +16,7 @@ from glisson.geometry.normals import vertex_normals
 from glisson.phantom.sparse_data.liver import FALCIFORM, SparseLiver
 
 STROKE_MM, STEP_MM = 9.0, 4.0
-"""Distance between strokes, and between points along one."""
+"""Distance between strokes as the viewer sees them, and between points along one."""
 
 _WIDTH_MM, _DENSITY = 1.2, 4.0
 """A stroke is made of points of a band of this width, of which so many for each that stays are drawn first."""

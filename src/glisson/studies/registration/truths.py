@@ -29,9 +29,11 @@ TRUTH_EDGE_MM = 14.0
 """Some 10,000 quadratic elements, where the models under test are coarser and may be linear."""
 
 
-def truth_point(seed: int, member: int, packings: int, edge_mm: float = TRUTH_EDGE_MM) -> Point:
+def truth_point(seed: int, member: int, packings: int) -> Point:
     """The point that packs one liver in so many ways."""
-    return Point(PACK, {"seed": seed, "member": member, "packings": packings, "edge_mm": edge_mm}, cost=packings + 0.6)
+    return Point(
+        PACK, {"seed": seed, "member": member, "packings": packings, "edge_mm": TRUTH_EDGE_MM}, cost=packings + 0.6
+    )
 
 
 def pack_liver(inputs: Mapping[str, Any], folder: Path) -> Outcome:
