@@ -41,7 +41,7 @@ def bent_case(number: int = 0) -> SparseCase:
 @pytest.fixture(scope="module")
 def model(tmp_path_factory: pytest.TempPathFactory) -> Model:
     folder = tmp_path_factory.mktemp("model")
-    point = model_point(0, FIRST_TUNING_MEMBER, 28.0)
+    point = model_point(0, FIRST_TUNING_MEMBER)
     PointStore(folder).keep(point, make_model(point.inputs, folder))
     return read_model(folder, point.key)
 

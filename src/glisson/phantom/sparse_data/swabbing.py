@@ -33,7 +33,7 @@ _RAGGED, _RAGGED_MM = 0.6, 45.0
 _START_MM = 55.0
 """A surgeon begins within so much of the notch, where the falciform ligament meets the lower margin."""
 
-_FEATURE_REACH_MM = 30.0
+_FEATURE_REACH_MM = 60.0
 _LEAST_FEATURE_POINTS = 4
 
 
