@@ -23,4 +23,4 @@ def elastic_fit(
     start = MotionState(place.fit.state.rotation, place.fit.state.shift_mm, np.zeros(motion.size - 6))
     found = fit(motion, Seen(model, observations, error), start)
     positions, spread = motion.positions(found.state), posterior_spread(motion, found)
-    return outcome(model, observations.frame, positions, spread, found.weights, place.ambiguous)
+    return outcome(model, observations.frame, positions, spread, found.beliefs, place.ambiguous)

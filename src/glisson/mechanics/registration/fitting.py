@@ -1,6 +1,5 @@
 """Gauss–Newton over a motion: what was seen pulls at material points, which are found anew at every step."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,14 +9,14 @@ from glisson.core.arrays import FloatArray
 from glisson.core.errors import StageFailed
 from glisson.core.status import Status
 from glisson.mechanics.registration.motion import Motion, MotionState
-from glisson.mechanics.registration.outliers import CUTS, judged
+from glisson.mechanics.registration.outliers import cuts, judged
+from glisson.mechanics.registration.rest import Rest
 from glisson.mechanics.registration.rows import Rows
 from glisson.mechanics.registration.seen import Seen
 
 _ITERATIONS = 200
-_AT_REST = 1e-5
-"""A step that promises to lower half the sum of squares by less than this is nothing beside its noise, which is 1."""
-
+_AT_REST, _NEARLY = 1e-4, 1e-2
+_MOST_DAMPING = 1e6
 _LONGEST_MM = 15.0
 
 
@@ -28,7 +27,7 @@ class Fit:
     Args:
         state: of the motion.
         rows: what was seen, there.
-        weights: (p,) how much each observed point counts, 0 to 1.
+        beliefs: (p,) how far each observed point is believed, 0 to 1.
         data, prior: Hessians (size, size) of what was seen and of the motion's own cost.
         gradient: (size,) of the cost.
         cost: half the sum of all squares.
@@ -36,50 +35,51 @@ class Fit:
 
     state: MotionState
     rows: Rows
-    weights: FloatArray
+    beliefs: FloatArray
     data: FloatArray
     prior: FloatArray
     gradient: FloatArray
     cost: float
 
 
-def fit(motion: Motion, seen: Seen, start: MotionState, told: Callable[[int], None] = lambda step: None) -> Fit:
+def fit(motion: Motion, seen: Seen, start: MotionState) -> Fit:
     """The state that explains what was seen at the least cost (Geman and McClure's function for outliers).
 
     Raises:
         StageFailed: it does not come to rest, or nothing holds the organ.
     """
     state = start
-    for cut in CUTS:
-        found = _descend(motion, seen, state, cut, told)
+    widths = cuts(seen.rows(motion.positions(start)), seen.count)
+    for cut in widths:
+        found = _descend(motion, seen, state, cut, Rest(_AT_REST if cut == widths[-1] else _NEARLY))
         state = found.state
     return found
 
 
-def _descend(motion: Motion, seen: Seen, state: MotionState, cut: float, told: Callable[[int], None]) -> Fit:
-    damping = 1e-6
+def _descend(motion: Motion, seen: Seen, state: MotionState, cut: float, rest: Rest) -> Fit:
+    damping, growth = 1e-6, 2.0
     here = _at(motion, seen, state, cut)
-    for step_number in range(_ITERATIONS):
-        told(step_number)
+    for _ in range(_ITERATIONS):
         matrix = here.data + here.prior
-        scale = np.diag(matrix) + 1e-9 * np.trace(matrix) / len(matrix)
+        scale = damping * (np.diag(matrix) + 1e-9 * np.trace(matrix) / len(matrix))
         try:
-            step = cho_solve(cho_factor(matrix + damping * np.diag(scale)), -here.gradient)
+            step = cho_solve(cho_factor(matrix + np.diag(scale)), -here.gradient)
         except LinAlgError:
-            damping = max(10.0 * damping, 1e-6)
+            damping, growth = damping * growth, 2.0 * growth
             continue
-        length = _length(step)
-        step *= min(1.0, _LONGEST_MM / max(length, 1e-12))
-        if -float(here.gradient @ step) < _AT_REST and length < _LONGEST_MM:
-            return here
-        there = _at(motion, seen, motion.moved(here.state, step), cut)
-        if there.cost < here.cost:
-            settled = here.cost - there.cost < _AT_REST
-            damping, here = max(damping / 5.0, 1e-9), there
-            if settled:
+        share = min(1.0, _LONGEST_MM / max(_length(step), 1e-12))
+        there = _at(motion, seen, motion.moved(here.state, share * step), cut)
+        gained = here.cost - there.cost
+        if gained > 0.0:
+            # The damping falls by as much as the step kept its promise (Nielsen 1999).
+            promised = 0.5 * share * float(step @ (scale * step - here.gradient))
+            kept = min(gained / promised, 2.0)
+            damping, growth = max(damping * max(1.0 / 3.0, 1.0 - (2.0 * kept - 1.0) ** 3), 1e-9), 2.0
+            here = there
+            if rest.reached(here.cost):
                 return here
-        elif damping < 1e6:
-            damping *= 5.0
+        elif damping < _MOST_DAMPING:
+            damping, growth = damping * growth, 2.0 * growth
         else:
             return here
     raise StageFailed("The organ does not come to rest on what was seen.", Status.ITERATION_LIMIT)
@@ -90,9 +90,9 @@ def _at(motion: Motion, seen: Seen, state: MotionState, cut: float) -> Fit:
     judgement = judged(rows, seen.count, cut)
     own, pull, prior = motion.prior(state)
     jacobian = _jacobian(motion, state, rows)
-    weighted = jacobian * judgement.weights[rows.point, None]
+    weighted = jacobian * judgement.weights[:, None]
     gradient = pull - weighted.T @ rows.residuals
-    return Fit(state, rows, judgement.weights, weighted.T @ jacobian, prior, gradient, judgement.cost + own)
+    return Fit(state, rows, judgement.beliefs, weighted.T @ jacobian, prior, gradient, judgement.cost + own)
 
 
 def _jacobian(motion: Motion, state: MotionState, rows: Rows) -> FloatArray:

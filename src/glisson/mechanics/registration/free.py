@@ -8,6 +8,7 @@ from glisson.core.observations import Observations
 from glisson.core.protocols import Progress, silent
 from glisson.core.registered import Registered
 from glisson.mechanics.registration.checks import check_observations
+from glisson.mechanics.registration.expected_energy import energy_per_mode_uj
 from glisson.mechanics.registration.full_fit import FullFit
 from glisson.mechanics.registration.motion import BasisMotion
 from glisson.mechanics.registration.outcome import outcome
@@ -19,11 +20,11 @@ from glisson.mechanics.registration.seen import ModelError, Seen
 class FreeParameters:
     """Of the free body.
 
-    `energy_uj_per_kpa` is the strain energy that is expected per unknown, for a Young's modulus of 1 kPa; the model's
-    error in mm, over which length (mm) alike; `modes` how many of the least certain ways to move are told.
+    `strain` is the typical strain that is expected; the model's error is in mm, over which length (mm) alike; `modes`
+    is how many of the least certain ways to move are told.
     """
 
-    energy_uj_per_kpa: float = 2000.0
+    strain: float = 0.05
     model_error_mm: float = 1.0
     model_error_length_mm: float = 10.0
     modes: int = 60
@@ -52,13 +53,12 @@ class Free:
         place = placed(model, observations, Seen(model, observations, RIGID_ERROR), rigid)
         chosen = self._parameters
         seen = Seen(model, observations, ModelError(chosen.model_error_mm, chosen.model_error_length_mm))
-        softest = min(material.young_modulus_kpa for material in model.materials.values())
         progress(0.4, "deforming the organ")
-        full = FullFit(model, seen, chosen.energy_uj_per_kpa * softest)
+        full = FullFit(model, seen, energy_per_mode_uj(model, chosen.strain))
         try:
             found = full.fit(rigid.positions(place.fit.state))
             progress(0.8, "how sure it is")
             spread = full.posterior_spread(found, chosen.modes)
         finally:
             full.close()
-        return outcome(model, observations.frame, found.positions, spread, found.weights, place.ambiguous)
+        return outcome(model, observations.frame, found.positions, spread, found.beliefs, place.ambiguous)

@@ -12,23 +12,25 @@ from glisson.core.status import Status
 from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.linear_solvers import make_direct_solver
 from glisson.mechanics.pattern import FreeSystem, Stiffness, block_pattern
-from glisson.mechanics.registration.outliers import CUTS, judged
+from glisson.mechanics.registration.outliers import cuts, judged
+from glisson.mechanics.registration.rest import Rest
 from glisson.mechanics.registration.rows import Rows
 from glisson.mechanics.registration.seen import Seen
 
-_ITERATIONS = 60
-_AT_REST = 1e-4
-_SHORTEST = 1e-4
+_ITERATIONS = 100
+_AT_REST, _NEARLY = 1e-4, 1e-1
+_MOST_DAMPING, _AFTER_FAILURE = 1e6, 1e-3
 _HOLDING = 1e-6
 """Stiffness per node (1/mm²) that keeps the matrix regular where nothing holds a rigid motion."""
 
 
 @dataclass(frozen=True, eq=False)
 class FullState:
-    """Node positions (n, 3), what was seen there, how much each observed point counts (p,), and the cost."""
+    """Nodes (n, 3), the rows there, how far each point is believed (p,), what each row counts (r,), the cost."""
 
     positions: FloatArray
     rows: Rows
+    beliefs: FloatArray
     weights: FloatArray
     cost: float
 
@@ -56,14 +58,15 @@ class FullFit:
         Raises:
             StageFailed: it does not come to rest.
         """
-        for cut in CUTS:
-            found = self._descend(positions, cut)
+        widths = cuts(self._seen.rows(positions), self._seen.count)
+        for cut in widths:
+            found = self._descend(positions, cut, Rest(_AT_REST if cut == widths[-1] else _NEARLY))
             positions = found.positions
         return found
 
     def posterior_spread(self, found: FullState, modes: int) -> FloatArray:
         """The least certain ways to move (n, 3, modes), each by one standard deviation."""
-        if not self._solver.factor(self._hessian(found, project=True)):
+        if not self._solver.factor(self._hessian(found, 0.0)):
             raise StageFailed("How sure the registration is cannot be told.", Status.SINGULAR)
         size = found.positions.size
 
@@ -79,48 +82,53 @@ class FullFit:
         """Give the factor's memory back."""
         self._solver.close()
 
-    def _descend(self, positions: FloatArray, cut: float) -> FullState:
+    def _descend(self, positions: FloatArray, cut: float, rest: Rest) -> FullState:
         here = self._at(positions, cut)
+        damping, growth = 1e-6, 2.0
         for _ in range(_ITERATIONS):
             gradient = self._gradient(here)
-            if not self._solver.factor(self._hessian(here, project=True)):
-                raise StageFailed("Nothing holds the organ.", Status.SINGULAR)
+            if not self._solver.factor(self._hessian(here, damping)):
+                damping, growth = damping * growth, 2.0 * growth
+                continue
             step = self._solved(-gradient)
-            promised = -float((gradient * step).sum())
-            share = 1.0
             there = self._at(here.positions + step, cut)
-            while there.cost > here.cost - 1e-4 * share * promised and share > _SHORTEST:
-                share *= 0.5
-                there = self._at(here.positions + share * step, cut)
             gained = here.cost - there.cost
             if gained > 0.0:
+                # The damping falls by as much as the step kept its promise (Nielsen 1999).
+                kept = min(gained / max(-0.5 * float((gradient * step).sum()), 1e-12), 2.0)
+                damping, growth = max(damping * max(1.0 / 3.0, 1.0 - (2.0 * kept - 1.0) ** 3), 1e-9), 2.0
                 here = there
-            if gained < _AT_REST:
-                return here
+                if rest.reached(here.cost):
+                    return here
+            elif damping < _MOST_DAMPING:
+                damping, growth = max(damping, _AFTER_FAILURE) * growth, 2.0 * growth
+            else:
+                return here  # no step is short enough to gain anything
         raise StageFailed("The organ does not come to rest on what was seen.", Status.ITERATION_LIMIT)
 
     def _at(self, positions: FloatArray, cut: float) -> FullState:
         rows = self._seen.rows(positions)
         judgement = judged(rows, self._seen.count, cut)
         energy = self._elasticity.energy(positions) / self._energy_uj
-        return FullState(positions, rows, judgement.weights, judgement.cost + energy)
+        return FullState(positions, rows, judgement.beliefs, judgement.weights, judgement.cost + energy)
 
     def _gradient(self, here: FullState) -> FloatArray:
         rows = here.rows
-        pull = (here.weights[rows.point] * rows.residuals / rows.sigma_mm)[:, None] * rows.directions
+        pull = (here.weights * rows.residuals / rows.sigma_mm)[:, None] * rows.directions
         gradient = self._elasticity.forces(here.positions) / self._energy_uj
         np.add.at(gradient, rows.nodes, -rows.weights[:, :, None] * pull[:, None])
         return gradient
 
-    def _hessian(self, here: FullState, project: bool) -> Stiffness:
+    def _hessian(self, here: FullState, damping: float) -> Stiffness:
+        """Without the curvature of what turns: positive definite (Levenberg 1944, Teran et al. 2005)."""
         blocks = np.zeros((self._pattern.block_count, 3, 3))
-        self._elasticity.add_stiffness(here.positions, self._pattern, blocks, project)
+        self._elasticity.add_stiffness(here.positions, self._pattern, blocks, project=True)
         blocks /= self._energy_uj
         rows = here.rows
-        scaled = rows.directions * (np.sqrt(here.weights[rows.point]) / rows.sigma_mm)[:, None]
+        scaled = rows.directions * (np.sqrt(here.weights) / rows.sigma_mm)[:, None]
         outer = np.einsum("ra,rb,ri,rj->rabij", rows.weights, rows.weights, scaled, scaled)
         self._pattern.add_groups(rows.nodes, outer, blocks)
-        self._pattern.add_diagonal(np.full(len(here.positions), _HOLDING), blocks)
+        self._pattern.add_diagonal(damping * self._pattern.diagonal(blocks).mean(axis=1) + _HOLDING, blocks)
         return Stiffness(self._pattern, self._system, blocks, here.positions)
 
     def _solved(self, load: FloatArray) -> FloatArray:

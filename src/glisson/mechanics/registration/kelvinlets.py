@@ -15,6 +15,7 @@ from glisson.geometry.spreading import evenly_spread
 from glisson.mechanics.registration.basis import ElasticModes, elastic_modes
 from glisson.mechanics.registration.checks import check_observations
 from glisson.mechanics.registration.elastic_fit import elastic_fit
+from glisson.mechanics.registration.expected_energy import energy_per_mode_uj
 from glisson.mechanics.registration.motion import BasisMotion
 from glisson.mechanics.registration.seen import ModelError
 
@@ -23,14 +24,13 @@ from glisson.mechanics.registration.seen import ModelError
 class KelvinletsParameters:
     """Of the Kelvinlets.
 
-    `centres` is the number of places on the surface at which forces act; `radius_mm` how blunt they are;
-    `energy_uj_per_kpa` how much energy is expected per unknown, at a Young's modulus of 1 kPa; the model's error in mm,
-    over which length (mm) alike.
+    `centres` is the number of places on the surface at which forces act, `radius_mm` how blunt they are;
+    `strain` is the typical strain that is expected; the model's error is in mm, over which length (mm) alike.
     """
 
     centres: int = 45
     radius_mm: float = 30.0
-    energy_uj_per_kpa: float = 2000.0
+    strain: float = 0.05
     model_error_mm: float = 1.0
     model_error_length_mm: float = 10.0
 
@@ -55,8 +55,7 @@ class Kelvinlets:
         check_observations(model, observations)
         chosen = self._parameters
         modes = kelvinlet_modes(model, chosen.centres, chosen.radius_mm)
-        softest = min(material.young_modulus_kpa for material in model.materials.values())
-        precision = np.diag(2.0 * modes.energies_uj / (chosen.energy_uj_per_kpa * softest))
+        precision = np.diag(2.0 * modes.energies_uj / energy_per_mode_uj(model, chosen.strain))
         motion = BasisMotion(model.mesh.nodes, modes.basis, precision)
         error = ModelError(chosen.model_error_mm, chosen.model_error_length_mm)
         return elastic_fit(model, observations, motion, error, progress)

@@ -12,6 +12,7 @@ from glisson.core.registered import Registered
 from glisson.mechanics.registration.basis import boundary_responses
 from glisson.mechanics.registration.checks import check_observations
 from glisson.mechanics.registration.elastic_fit import elastic_fit
+from glisson.mechanics.registration.expected_energy import energy_per_mode_uj
 from glisson.mechanics.registration.motion import BasisMotion
 from glisson.mechanics.registration.seen import ModelError
 
@@ -20,12 +21,12 @@ from glisson.mechanics.registration.seen import ModelError
 class LinearBasisParameters:
     """Of the linear basis.
 
-    `controls` is the number of points of the surface that move; `energy_uj_per_kpa` how much strain energy (µJ) is
-    expected per unknown, for a Young's modulus of 1 kPa; the model's error in mm, over which length (mm) alike.
+    `controls` is the number of points of the surface that move;
+    `strain` is the typical strain that is expected; the model's error is in mm, over which length (mm) alike.
     """
 
     controls: int = 45
-    energy_uj_per_kpa: float = 2000.0
+    strain: float = 0.05
     model_error_mm: float = 1.0
     model_error_length_mm: float = 20.0
 
@@ -51,8 +52,7 @@ class LinearBasis:
         progress(0.0, "responses of the surface")
         chosen = self._parameters
         modes = boundary_responses(model, chosen.controls)
-        softest = min(material.young_modulus_kpa for material in model.materials.values())
-        precision = np.diag(2.0 * modes.energies_uj / (chosen.energy_uj_per_kpa * softest))
+        precision = np.diag(2.0 * modes.energies_uj / energy_per_mode_uj(model, chosen.strain))
         motion = BasisMotion(model.mesh.nodes, modes.basis, precision)
         error = ModelError(chosen.model_error_mm, chosen.model_error_length_mm)
         return elastic_fit(model, observations, motion, error, progress)

@@ -22,7 +22,7 @@ def outcome(
     frame: str,
     positions: FloatArray,
     spread_mm: FloatArray,
-    weights: FloatArray,
+    beliefs: FloatArray,
     ambiguous: str | None,
 ) -> Registered:
     """The answer of a fit that came to rest.
@@ -32,7 +32,7 @@ def outcome(
         frame: of the observations.
         positions: nodes (n, 3) now.
         spread_mm: (n, 3, k), see `Registered`.
-        weights: (p,) of the observed points, 0 to 1.
+        beliefs: (p,) how far each observed point is believed, 0 to 1.
         ambiguous: a sentence on another answer that is as good.
     """
     unobserved = unheld_motions(positions, spread_mm)
@@ -47,7 +47,7 @@ def outcome(
         frame=frame,
         spread_mm=spread_mm,
         unobserved=unobserved,
-        set_aside=float((weights < _SET_ASIDE).mean()),
+        set_aside=float((beliefs < _SET_ASIDE).mean()),
     )
 
 

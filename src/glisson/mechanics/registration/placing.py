@@ -12,7 +12,7 @@ from glisson.mechanics.registration.global_start import rigid_starts
 from glisson.mechanics.registration.motion import BasisMotion, MotionState
 from glisson.mechanics.registration.seen import ModelError, Seen
 
-RIGID_ERROR = ModelError(4.0, 40.0)
+RIGID_ERROR = ModelError(3.0, 25.0)
 """How far an organ is off that cannot deform."""
 
 _REFINED = 4

@@ -45,4 +45,4 @@ class Rigid:
         motion = BasisMotion(model.mesh.nodes)
         found = placed(model, observations, Seen(model, observations, error), motion)
         positions, spread = motion.positions(found.fit.state), posterior_spread(motion, found.fit)
-        return outcome(model, observations.frame, positions, spread, found.fit.weights, found.ambiguous)
+        return outcome(model, observations.frame, positions, spread, found.fit.beliefs, found.ambiguous)

@@ -1,7 +1,7 @@
 """What was seen as scalar rows: each pulls one material point along one direction."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -19,6 +19,7 @@ class Rows:
         gaps_mm: (r,) direction · (seen − point).
         sigma_mm: (r,) standard deviation of the gap.
         point: (r,) number of the observed point that the row belongs to; its rows count or are set aside together.
+        worth: (r,) how much the point counts beside others that are off together with it, 0 to 1.
         robust: (r,) whether the point may be an outlier.
     """
 
@@ -28,7 +29,12 @@ class Rows:
     gaps_mm: FloatArray
     sigma_mm: FloatArray
     point: IntArray
+    worth: FloatArray
     robust: FloatArray
+
+    def some(self, chosen: IntArray) -> "Rows":
+        """The rows of some numbers."""
+        return Rows(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
     @property
     def residuals(self) -> FloatArray:
@@ -37,7 +43,8 @@ class Rows:
 
     def squares(self, count: int) -> FloatArray:
         """Sum of the squares of the whitened gaps of each of `count` observed points."""
-        squares: FloatArray = np.bincount(self.point, self.residuals**2, minlength=count)
+        squares = np.zeros(count)
+        np.add.at(squares, self.point, self.residuals**2)
         return squares
 
 
@@ -52,6 +59,7 @@ def joined(parts: Sequence[Rows]) -> Rows:
         gaps_mm=np.concatenate([part.gaps_mm for part in parts]),
         sigma_mm=np.concatenate([part.sigma_mm for part in parts]),
         point=np.concatenate([part.point for part in parts]),
+        worth=np.concatenate([part.worth for part in parts]),
         robust=np.concatenate([part.robust for part in parts]),
     )
 

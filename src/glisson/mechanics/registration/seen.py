@@ -1,6 +1,6 @@
 """What was seen, held against a model: which material point each seen point belongs to."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -14,6 +14,7 @@ from glisson.mechanics.registration.places import MaterialCurve, MaterialPoints,
 from glisson.mechanics.registration.rows import Rows, joined
 
 _TOUCHING_MM = 1e-6
+_ON_EDGE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,14 @@ class ModelError:
 
     sigma_mm: float
     length_mm: float
+
+
+@dataclass(frozen=True, eq=False)
+class PointErrors:
+    """Covariance (p, 3, 3) of each point, the model's error within, and how much it counts beside its neighbours."""
+
+    covariance_mm2: FloatArray
+    worth: FloatArray
 
 
 class Match(Protocol):
@@ -56,13 +65,13 @@ class Seen:
         for item in observations.items:
             self._firsts.append(self.count)
             self.count += len(item.points_mm)
-            covariance = _with_model_error(item, model_error)
+            errors = _errors(item, model_error)
             if item.kind == "landmark":
-                self._matches.append(PointMatch(item.points_mm, covariance, places.landmark(item.name)))
+                self._matches.append(PointMatch(item.points_mm, errors, places.landmark(item.name)))
             elif item.kind == "curve":
-                self._matches.append(CurveMatch(item.points_mm, covariance, places.curve(item.name)))
+                self._matches.append(CurveMatch(item.points_mm, errors, places.curve(item.name)))
             else:
-                self._matches.append(SurfaceMatch(item.points_mm, covariance, places.surface(item.name)))
+                self._matches.append(SurfaceMatch(item.points_mm, errors, places.surface(item.name)))
 
     @property
     def groups(self) -> list[IntArray]:
@@ -78,8 +87,8 @@ class Seen:
 class SurfaceMatch:
     """Points somewhere on a surface: each pulls at the nearest point of it, along the line between them."""
 
-    def __init__(self, points_mm: FloatArray, covariance_mm2: FloatArray, triangles: IntArray) -> None:
-        self._points, self._covariance, self._triangles = points_mm, covariance_mm2, triangles
+    def __init__(self, points_mm: FloatArray, errors: PointErrors, triangles: IntArray) -> None:
+        self._points, self._errors, self._triangles = points_mm, errors, triangles
         self.groups = np.zeros((0, 1), dtype=np.int64)
 
     def rows(self, positions: FloatArray, first: int) -> Rows:
@@ -91,17 +100,35 @@ class SurfaceMatch:
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         touching = nearest.distance_mm < _TOUCHING_MM
         directions = np.where(touching[:, None], normals, arms)
-        directions /= np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-300)
-        return _along(directions, nearest.distance_mm, self._covariance, nodes, nearest.barycentric, first, True)
+        pulls = _along(_unit(directions), nearest.distance_mm, self._errors, nodes, nearest.barycentric, first, True)
+        return joined([pulls, *self._held(pulls, corners, nearest.barycentric)])
+
+    def _held(self, pulls: Rows, corners: FloatArray, barycentric: FloatArray) -> list[Rows]:
+        """Rows without a gap: what is nearest to an edge or a corner stays so however the surface moves a little.
+
+        With them the matrix of a Gauss–Newton step has the true curvature of the squared distance.
+        """
+        inner = (barycentric > _ON_EDGE).sum(axis=1)
+        longest = np.argsort(barycentric, axis=1)
+        rows = np.arange(len(corners))
+        edge = corners[rows, longest[:, 2]] - corners[rows, longest[:, 1]]
+        across_edge = np.cross(edge, pulls.directions)
+        found = []
+        for chosen, axes in ((inner == 2, (across_edge,)), (inner == 1, _across(pulls.directions))):
+            found += [
+                replace(pulls, directions=_unit(axis), gaps_mm=np.zeros(len(axis))).some(np.flatnonzero(chosen))
+                for axis in axes
+            ]
+        return found
 
 
 class PointMatch:
     """A material point that is seen, perhaps several times."""
 
-    def __init__(self, points_mm: FloatArray, covariance_mm2: FloatArray, place: MaterialPoints) -> None:
-        self._points, self._place = points_mm, place
+    def __init__(self, points_mm: FloatArray, errors: PointErrors, place: MaterialPoints) -> None:
+        self._points, self._place, self._worth = points_mm, place, errors.worth
         self.groups = place.nodes
-        values, self._axes = np.linalg.eigh(covariance_mm2)
+        values, self._axes = np.linalg.eigh(errors.covariance_mm2)
         self._sigma = np.sqrt(values)
 
     def rows(self, positions: FloatArray, first: int) -> Rows:
@@ -115,6 +142,7 @@ class PointMatch:
             gaps_mm=gaps.ravel(),
             sigma_mm=self._sigma.ravel(),
             point=first + np.repeat(np.arange(count), 3),
+            worth=np.repeat(self._worth, 3),
             robust=np.zeros(3 * count),
         )
 
@@ -122,8 +150,8 @@ class PointMatch:
 class CurveMatch:
     """Points along a curve in the tissue, which may slide: each pulls at the nearest point of it."""
 
-    def __init__(self, points_mm: FloatArray, covariance_mm2: FloatArray, curve: MaterialCurve) -> None:
-        self._points, self._covariance, self._curve = points_mm, covariance_mm2, curve
+    def __init__(self, points_mm: FloatArray, errors: PointErrors, curve: MaterialCurve) -> None:
+        self._points, self._errors, self._curve = points_mm, errors, curve
         self.groups = curve.points.nodes[curve.segments].reshape(len(curve.segments), -1)
 
     def rows(self, positions: FloatArray, first: int) -> Rows:
@@ -149,38 +177,42 @@ class CurveMatch:
         arms = self._points - begin[nearest] - share[:, None] * along[nearest]
         first_across, second_across = _across(along[nearest])
         parts = [
-            _along(axis, np.einsum("pi,pi->p", arms, axis), self._covariance, nodes, weights, first, True)
+            _along(axis, np.einsum("pi,pi->p", arms, axis), self._errors, nodes, weights, first, True)
             for axis in (first_across, second_across)
         ]
         return joined(parts)
 
 
 def _along(
-    directions: FloatArray, gaps: FloatArray, covariance: FloatArray, nodes: IntArray, weights: FloatArray, first: int,
+    directions: FloatArray, gaps: FloatArray, errors: PointErrors, nodes: IntArray, weights: FloatArray, first: int,
     robust: bool,
 ) -> Rows:  # fmt: skip
     """One row for each point, along its direction."""
-    sigma = np.sqrt(np.einsum("pi,pij,pj->p", directions, covariance, directions))
-    count = len(gaps)
-    return Rows(nodes, weights, directions, gaps, sigma, first + np.arange(count), np.full(count, float(robust)))
+    sigma = np.sqrt(np.einsum("pi,pij,pj->p", directions, errors.covariance_mm2, directions))
+    numbers, may_lie = first + np.arange(len(gaps)), np.full(len(gaps), float(robust))
+    return Rows(nodes, weights, directions, gaps, sigma, numbers, errors.worth, may_lie)
 
 
 def _across(along: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Two unit vectors (p, 3) across each of some directions (p, 3), and across each other."""
-    unit = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
+    unit = _unit(along)
     least = np.eye(3)[np.abs(unit).argmin(axis=1)]
-    one = np.cross(unit, least)
-    one /= np.linalg.norm(one, axis=1, keepdims=True)
+    one = _unit(np.cross(unit, least))
     return one, np.cross(unit, one)
 
 
-def _with_model_error(item: Observation, error: ModelError) -> FloatArray:
-    """Covariance (p, 3, 3) of each point: its own, and the model's, which neighbours share."""
+def _unit(vectors: FloatArray) -> FloatArray:
+    unit: FloatArray = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300)
+    return unit
+
+
+def _errors(item: Observation, model: ModelError) -> PointErrors:
     count = len(item.points_mm)
     own = item.covariance_mm2
     if own is None:
         own = np.tile(item.sigma_mm**2 * np.eye(3), (count, 1, 1))
-    near = KDTree(item.points_mm).query_ball_point(item.points_mm, error.length_mm, return_length=True)
+    near = KDTree(item.points_mm).query_ball_point(item.points_mm, model.length_mm, return_length=True)
+    variance, shared = np.trace(own, axis1=1, axis2=2) / 3.0, model.sigma_mm**2
     # Points that are off together by the same error tell no more than one of them does.
-    shared: FloatArray = own + error.sigma_mm**2 * near[:, None, None] * np.eye(3)
-    return shared
+    worth = (variance + shared) / (variance + near * shared)
+    return PointErrors(own + shared * np.eye(3), worth)
