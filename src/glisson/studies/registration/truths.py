@@ -2,10 +2,12 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from pkgutil import iter_modules
 from typing import Any
 
 import numpy as np
 
+from glisson import mechanics
 from glisson.core.errors import StageFailed
 from glisson.core.mesh import TetMesh
 from glisson.core.status import Status
@@ -23,7 +25,12 @@ from glisson.studies.store import read_arrays
 PACKAGES = ("glisson.core", "glisson.geometry", "glisson.phantom", "glisson.studies.meshing")
 """Ours on whose source every point of the twin rests."""
 
-PACK = Task(f"{__name__}:pack_liver", (*PACKAGES, "glisson.mechanics", "glisson.preoperative.meshing", __name__))
+_SOLVER = tuple(
+    f"glisson.mechanics.{found.name}" for found in iter_modules(mechanics.__path__) if found.name != "registration"
+)
+"""The solver without the techniques under test: no truth is made anew because one of them changed."""
+
+PACK = Task(f"{__name__}:pack_liver", (*PACKAGES, *_SOLVER, "glisson.preoperative.meshing", __name__))
 
 TRUTH_EDGE_MM = 14.0
 """Some 10,000 quadratic elements, where the models under test are coarser and may be linear."""
