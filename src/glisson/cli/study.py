@@ -16,6 +16,7 @@ from glisson.studies.executor import Executor
 from glisson.studies.lift_robustness.study import LiftRobustness
 from glisson.studies.local_pool import LocalPool
 from glisson.studies.region.study import RegionStudy
+from glisson.studies.registration.study import SparseDataTwin
 from glisson.studies.segmentation.study import SegmentationStudy
 from glisson.studies.sensitivity.study import Sensitivity
 from glisson.studies.study import Study, run_study
@@ -30,6 +31,7 @@ STUDIES = {
     "region": "how much faster a lift is by its region of interest, and what that costs",
     "segmentation": "how well the liver is found in scans of the phantom family, and whether failures are flagged",
     "sensitivity": "how much mesh, law, stiffness, compressibility and contact move the tumour's place",
+    "sparse-data": "how well registrations find livers of which only a part of the surface is seen",
     "trocar": "how wrong the pose of a trocar is that sees crosses, and whether a wrong one passes silently",
     "surface": "how wrong surface points from two laparoscope views are (the dissertation's Tables 3 and 4)",
     "ventilation": "how well breathing is told and taken away, and where faster ventilation stops helping",
@@ -37,10 +39,13 @@ STUDIES = {
 
 
 _OWN_OPTIONS = {
-    "seed": (LiftRobustness.name, ContactStudy.name, SurfaceStudy.name, TrocarStudy.name, VentilationStudy.name),
+    "seed": (
+        LiftRobustness.name, ContactStudy.name, SparseDataTwin.name, SurfaceStudy.name, TrocarStudy.name,
+        VentilationStudy.name,
+    ),
     "long": (Sensitivity.name,),
     "element": (Sensitivity.name,),
-}
+}  # fmt: skip
 """Options that only some studies have."""
 
 
@@ -93,6 +98,8 @@ def _study(arguments: argparse.Namespace) -> Study:
         return SegmentationStudy.of(arguments.quick)
     if arguments.study == TrocarStudy.name:
         return TrocarStudy.of(arguments.quick, seed)
+    if arguments.study == SparseDataTwin.name:
+        return SparseDataTwin.of(arguments.quick, seed)
     if arguments.study == SurfaceStudy.name:
         return SurfaceStudy.of(arguments.quick, seed)
     if arguments.study == VentilationStudy.name:

@@ -57,9 +57,10 @@ def build_sparse_liver(member: int) -> SparseLiver:
 
 def _targets(solid: Solid, member: int) -> FloatArray:
     random = np.random.default_rng([member, 41])
-    drawn = random.uniform(*solid.bounds, size=(_CANDIDATES, 3))
+    drawn = random.uniform(solid.bounds[0], solid.bounds[1], size=(_CANDIDATES, 3))
     inside = drawn[solid.distance(drawn) < -_TARGET_DEPTH_MM]
-    return inside[evenly_spread(inside, TARGETS)]
+    chosen: FloatArray = inside[evenly_spread(inside, TARGETS)]
+    return chosen
 
 
 def _features(surface: TriangleSurface, proportions: Proportions) -> dict[str, Curve]:

@@ -33,7 +33,7 @@ _RIGHT = ((-90.0, -12.0), (-62.0, 32.0), (-52.0, -42.0))
 _LEFT = ((26.0, 6.0), (54.0, 24.0))
 """Where packs may lie under a lobe of the nominal member, x and z in mm."""
 
-_PUSH_MM, _ASIDE_MM = (10.0, 19.0), 5.0
+_PUSH_MM, _ASIDE_MM = (10.0, 18.5), 5.0
 _RADIUS_MM = (30.0, 42.0)
 _SHARE_OF_WEIGHT = (0.1, 0.4)
 

@@ -9,16 +9,20 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
-from glisson.core.arrays import FloatArray, IntArray
+from glisson.core.arrays import FloatArray, IntArray, unit_vector
 from glisson.core.mesh import TriangleSurface
 from glisson.core.structures import Curve
 from glisson.geometry.normals import vertex_normals
 from glisson.phantom.sparse_data.liver import FALCIFORM, SparseLiver
 
 STROKE_MM, STEP_MM = 9.0, 4.0
-"""Distance between strokes, and between points along one."""
+"""Distance between strokes as the viewer sees them, and between points along one."""
 
-_ALONG_MM, _FEATURE_STEP_MM = 1.2, 4.0
+_WIDTH_MM, _DENSITY = 1.2, 4.0
+"""A stroke is made of points of a band of this width, of which so many for each that stays are drawn first."""
+
+_WAVER_MM, _WAVER_LENGTH_MM = 2.5, 14.0
+_FEATURE_STEP_MM = 4.0
 _VIEW_TILT_DEG = 10.0
 _FACING = 0.1
 """Seen is what faces the viewer by a cosine of so much."""
@@ -29,7 +33,7 @@ _RAGGED, _RAGGED_MM = 0.6, 45.0
 _START_MM = 55.0
 """A surgeon begins within so much of the notch, where the falciform ligament meets the lower margin."""
 
-_FEATURE_REACH_MM = 30.0
+_FEATURE_REACH_MM = 60.0
 _LEAST_FEATURE_POINTS = 4
 
 
@@ -104,8 +108,7 @@ def thinned(points: FloatArray, apart_mm: float) -> IntArray:
 def _view(random: np.random.Generator) -> FloatArray:
     """Unit vector (3,) towards the viewer: in front of the patient, somewhat to a side."""
     side = np.tan(np.radians(_VIEW_TILT_DEG)) * random.uniform(-1.0, 1.0, size=2)
-    view = np.array([side[0], -1.0, side[1]])
-    return view / np.linalg.norm(view)
+    return unit_vector([side[0], -1.0, side[1]], "view")
 
 
 def _path_lengths(
@@ -138,14 +141,15 @@ def _strokes(
     corners = surface.vertices[triangles]
     sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     areas = 0.5 * np.linalg.norm(sides, axis=1)
-    per_point = STEP_MM * _ALONG_MM / 4.0
-    which = random.choice(len(areas), size=int(areas.sum() / per_point), p=areas / areas.sum())
+    dense = int(_DENSITY * areas.sum() / (STEP_MM * _WIDTH_MM))
+    which = random.choice(len(areas), size=dense, p=areas / areas.sum())
     points = np.einsum("nc,ncd->nd", random.dirichlet(np.ones(3), size=len(which)), corners[which])
     along = np.cross(view, random.normal(size=3))
     along /= np.linalg.norm(along)
     across = np.cross(view, along)
     phases = random.uniform(0.0, 2.0 * np.pi, size=2)
-    wavering = points @ across + 2.5 * np.sin(points @ along / 14.0 + phases[0])
+    wavering = points @ across + _WAVER_MM * np.sin(points @ along / _WAVER_LENGTH_MM + phases[0])
     beside = np.abs((wavering / STROKE_MM + phases[1] + 0.5) % 1.0 - 0.5) * STROKE_MM
-    on = points[beside < 0.5 * _ALONG_MM]
-    return on[thinned(on, STEP_MM)]
+    on: FloatArray = points[beside < 0.5 * _WIDTH_MM]
+    kept: FloatArray = on[thinned(on, STEP_MM)]
+    return kept

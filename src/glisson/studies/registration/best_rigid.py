@@ -17,10 +17,10 @@ from glisson.phantom.sparse_data.swabbing import evenly_along
 
 _ROUNDS = 100
 _STILL_MM = 1e-3
-_DOUBT_MM = 5.0
-"""A residual of so much halves a point's weight, so that wrong points hardly count."""
+_DOUBT_MM = 8.0
+"""Residuals beyond so much count ever less (Geman and McClure 1987), so that wrong points hardly do."""
 
-_CURVE_STEP_MM = 1.0
+_CURVE_STEP_MM = 0.1
 
 
 def of_targets(case: SparseCase) -> RigidTransform:
@@ -46,7 +46,7 @@ def of_data(case: SparseCase, liver: SparseLiver) -> RigidTransform:
                 parts.append(surface.nearest(back).closest_mm)
         closest = np.vstack(parts)
         away = np.linalg.norm(found.apply(closest) - seen, axis=1)
-        better = _fitted(closest, seen, 1.0 / (1.0 + (away / _DOUBT_MM) ** 2))
+        better = _fitted(closest, seen, 1.0 / (1.0 + (away / _DOUBT_MM) ** 2) ** 2)
         moved = np.abs(better.apply(closest) - found.apply(closest)).max()
         found = better
         if moved < _STILL_MM:

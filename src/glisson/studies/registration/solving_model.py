@@ -36,7 +36,9 @@ MODEL = Task(f"{__name__}:make_model", (*PACKAGES, "glisson.preoperative", __nam
 TISSUE = Material("neo-hookean", 5.0, 0.45)
 """What a user who has measured nothing would take."""
 
-SOLVING_EDGE_MM = 20.0
+EDGE_MM, ENVELOPE_MM = 20.0, 1.5
+"""Some 5,000 linear elements."""
+
 _VOXELS_MM = (1.5, 1.5, 2.0)
 _BORDER_SIGMA_MM, _BORDER_LENGTH_MM = 0.7, 8.0
 """A contour is off by so much, alike over such lengths."""
@@ -45,9 +47,9 @@ _DRAWN_SIGMA_MM = 1.5
 """So much a feature's line is off, all of it by the same."""
 
 
-def model_point(seed: int, member: int, edge_mm: float = SOLVING_EDGE_MM) -> Point:
+def model_point(seed: int, member: int) -> Point:
     """The point that makes a liver's model."""
-    return Point(MODEL, {"seed": seed, "member": member, "edge_mm": edge_mm}, cost=0.4)
+    return Point(MODEL, {"seed": seed, "member": member, "edge_mm": EDGE_MM, "envelope_mm": ENVELOPE_MM}, cost=0.4)
 
 
 def make_model(inputs: Mapping[str, Any], folder: Path) -> Outcome:
@@ -58,7 +60,7 @@ def make_model(inputs: Mapping[str, Any], folder: Path) -> Outcome:
     mask = _mask(member, grid, random)
     labels = LabelMap(mask.astype(np.uint8), grid, {1: ORGAN})
     surface = MarchingCubes(MarchingCubesParameters()).extract(mask, labels)
-    mesh = Mmg(MmgParameters(edge_length_mm=inputs["edge_mm"])).mesh(surface)
+    mesh = Mmg(MmgParameters(edge_length_mm=inputs["edge_mm"], envelope_mm=inputs["envelope_mm"])).mesh(surface)
     skin = mesh.surface()
     tree = SurfaceTree(skin.vertices, skin.triangles)
     curves = {

@@ -8,8 +8,11 @@ from typing import Any, ClassVar
 from glisson.core.errors import StageFailed
 from glisson.core.registry import list_techniques
 from glisson.core.status import Status
+from glisson.navigation.figures.picture import Picture
 from glisson.phantom.sparse_data.design import CaseDesign, Design
+from glisson.studies.page import png
 from glisson.studies.point import Outcome, Point
+from glisson.studies.registration.figures import PICTURE
 from glisson.studies.registration.rows import flat, scores, table_rows, totals
 from glisson.studies.registration.scoring import HARDNESS, SCORE
 from glisson.studies.registration.solving_model import model_point
@@ -51,11 +54,11 @@ class SparseDataTwin:
             if not made.is_good:
                 status = made.status or Status.STAGNATED
                 raise StageFailed(f"A liver of the twin could not be made: {made.message}", status)
-        return [point for case in self.design.cases() for point in self._of_case(case)]
+        return [*self._shown, *(point for case in self.design.cases() for point in self._of_case(case))]
 
     def conclude(self, prepared: Mapping[str, Outcome], done: Mapping[str, Outcome]) -> Conclusion:
         """Rows for machines, and the table as the challenge prints it."""
-        points = self.points(prepared)
+        points = [point for point in self.points(prepared) if point.task != PICTURE]
         found = scores((point, done[point.key]) for point in points if point.key in done)
         values: dict[str, Any] = {
             "rows": table_rows(found),
@@ -64,12 +67,24 @@ class SparseDataTwin:
             "failed": [f"{s.technique}, case {s.case.number}: {s.message}" for s in found if not s.errors_mm],
             "unfinished": sum(point.key not in done for point in points),
         }
-        files = {"rows.csv": as_csv(flat(values["rows"])), "report.html": as_page(values)}
+        shown = [done[point.key] for point in self._shown if point.key in done]
+        pictures = [Picture(**outcome.values) for outcome in shown if outcome.is_good]
+        files = {"rows.csv": as_csv(flat(values["rows"])), "report.html": as_page(values, pictures)}
+        files |= {f"case-{number}.png": png(one) for number, one in enumerate(pictures)}
         return Conclusion(values, "\n".join(as_lines(values)), files)
 
-    def _of_case(self, case: CaseDesign) -> list[Point]:
+    @property
+    def _shown(self) -> list[Point]:
+        """A picture of the first case of each kind."""
+        first = {case.origin: case for case in reversed(self.design.cases())}
+        return [Point(PICTURE, self._inputs(case)) for _, case in sorted(first.items(), reverse=True)]
+
+    def _inputs(self, case: CaseDesign) -> dict[str, Any]:
         truth = self._truths[case.member].key if case.origin == "packed" else None
-        inputs = {"case": asdict(case), "truth": truth}
+        return {"case": asdict(case), "truth": truth}
+
+    def _of_case(self, case: CaseDesign) -> list[Point]:
+        inputs = self._inputs(case)
         model = self._models[case.member].key
         more = [{"technique": name, "parameters": {}, "model": model} for name in self.techniques]
         return [Point(HARDNESS, inputs), *(Point(SCORE, {**inputs, **one}, cost=5.0) for one in more)]

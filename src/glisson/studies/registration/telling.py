@@ -1,8 +1,9 @@
 """The twin's scores for people: the table that the challenge prints, in lines and on a page."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+from glisson.navigation.figures.picture import Picture
 from glisson.studies.page import Page, Table, number, page_as_html
 from glisson.studies.registration.rows import BIN_NAMES, SETS
 
@@ -31,7 +32,7 @@ def as_lines(values: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def as_page(values: Mapping[str, Any]) -> bytes:
+def as_page(values: Mapping[str, Any], shown: Sequence[Picture]) -> bytes:
     """The page."""
     cells = [
         [
@@ -42,7 +43,7 @@ def as_page(values: Mapping[str, Any]) -> bytes:
         ]
         for row in values["totals"]
     ]
-    shown = Table(
+    errors = Table(
         "Target error (mm), mean ± standard deviation over all targets of all cases.",
         ["technique", *_PARTS, "95th", "median time (ms)"],
         cells,
@@ -52,7 +53,7 @@ def as_page(values: Mapping[str, Any]) -> bytes:
         "Sparse Data Challenge's, not its data: nothing here says how a technique would do there.",
         *(line for line in as_lines(values) if line.startswith(("failed", "note"))),
     ]
-    return page_as_html(Page("Registration from sparse surface data", lead, (), [shown]))
+    return page_as_html(Page("Registration from sparse surface data", lead, shown, [errors]))
 
 
 def _cell(spread: Mapping[str, float] | None) -> str:

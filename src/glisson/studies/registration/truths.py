@@ -2,10 +2,12 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from pkgutil import iter_modules
 from typing import Any
 
 import numpy as np
 
+from glisson import mechanics
 from glisson.core.errors import StageFailed
 from glisson.core.mesh import TetMesh
 from glisson.core.status import Status
@@ -23,15 +25,22 @@ from glisson.studies.store import read_arrays
 PACKAGES = ("glisson.core", "glisson.geometry", "glisson.phantom", "glisson.studies.meshing")
 """Ours on whose source every point of the twin rests."""
 
-PACK = Task(f"{__name__}:pack_liver", (*PACKAGES, "glisson.mechanics", "glisson.preoperative.meshing", __name__))
+_SOLVER = tuple(
+    f"glisson.mechanics.{found.name}" for found in iter_modules(mechanics.__path__) if found.name != "registration"
+)
+"""The solver without the techniques under test: no truth is made anew because one of them changed."""
+
+PACK = Task(f"{__name__}:pack_liver", (*PACKAGES, *_SOLVER, "glisson.preoperative.meshing", __name__))
 
 TRUTH_EDGE_MM = 14.0
 """Some 10,000 quadratic elements, where the models under test are coarser and may be linear."""
 
 
-def truth_point(seed: int, member: int, packings: int, edge_mm: float = TRUTH_EDGE_MM) -> Point:
+def truth_point(seed: int, member: int, packings: int) -> Point:
     """The point that packs one liver in so many ways."""
-    return Point(PACK, {"seed": seed, "member": member, "packings": packings, "edge_mm": edge_mm}, cost=packings + 0.6)
+    return Point(
+        PACK, {"seed": seed, "member": member, "packings": packings, "edge_mm": TRUTH_EDGE_MM}, cost=packings + 0.6
+    )
 
 
 def pack_liver(inputs: Mapping[str, Any], folder: Path) -> Outcome:
@@ -60,11 +69,13 @@ def build_case(design: CaseDesign, folder: Path, truth: str | None) -> SparseCas
     Raises:
         OSError: that point's file is missing or damaged.
     """
-    liver = build_sparse_liver(design.member)
-    return make_case(design, liver, bend_of(design, liver).forward if truth is None else _carry(design, folder, truth))
+    return make_case(design, build_sparse_liver(design.member), carry_of(design, folder, truth))
 
 
-def _carry(design: CaseDesign, folder: Path, truth: str) -> Carry:
+def carry_of(design: CaseDesign, folder: Path, truth: str | None) -> Carry:
+    """How a case is deformed; see `build_case`."""
+    if truth is None:
+        return bend_of(design, build_sparse_liver(design.member)).forward
     arrays = read_arrays(folder, truth)
     mesh = TetMesh(arrays["nodes"], arrays["tetrahedra"])
     return PointMap(mesh, arrays["displacements"][design.deformation]).forward
