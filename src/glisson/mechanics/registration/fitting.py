@@ -9,13 +9,13 @@ from glisson.core.arrays import FloatArray
 from glisson.core.errors import StageFailed
 from glisson.core.status import Status
 from glisson.mechanics.registration.motion import Motion, MotionState
-from glisson.mechanics.registration.outliers import cuts, judged
+from glisson.mechanics.registration.outliers import cuts, judged, narrowing
 from glisson.mechanics.registration.rest import Rest
 from glisson.mechanics.registration.rows import Rows
 from glisson.mechanics.registration.seen import Seen
 
 _ITERATIONS = 200
-_AT_REST, _NEARLY = 1e-4, 1e-2
+_AT_REST = 1e-4
 _MOST_DAMPING = 1e6
 _LONGEST_MM = 15.0
 
@@ -48,15 +48,12 @@ def fit(motion: Motion, seen: Seen, start: MotionState) -> Fit:
     Raises:
         StageFailed: it does not come to rest, or nothing holds the organ.
     """
-    state = start
-    widths = cuts(seen.rows(motion.positions(start)), seen.count)
-    for cut in widths:
-        found = _descend(motion, seen, state, cut, Rest(_AT_REST if cut == widths[-1] else _NEARLY))
-        state = found.state
-    return found
+    begun = _at(motion, seen, start, cuts(seen.rows(motion.positions(start)), seen.item))
+    return narrowing(begun, lambda fit: fit.rows, seen.item, lambda fit, cut: _descend(motion, seen, fit.state, cut))
 
 
-def _descend(motion: Motion, seen: Seen, state: MotionState, cut: float, rest: Rest) -> Fit:
+def _descend(motion: Motion, seen: Seen, state: MotionState, cut: FloatArray) -> Fit:
+    rest = Rest(_AT_REST)
     damping, growth = 1e-6, 2.0
     here = _at(motion, seen, state, cut)
     for _ in range(_ITERATIONS):
@@ -85,9 +82,9 @@ def _descend(motion: Motion, seen: Seen, state: MotionState, cut: float, rest: R
     raise StageFailed("The organ does not come to rest on what was seen.", Status.ITERATION_LIMIT)
 
 
-def _at(motion: Motion, seen: Seen, state: MotionState, cut: float) -> Fit:
+def _at(motion: Motion, seen: Seen, state: MotionState, cut: FloatArray) -> Fit:
     rows = seen.rows(motion.positions(state))
-    judgement = judged(rows, seen.count, cut)
+    judgement = judged(rows, cut)
     own, pull, prior = motion.prior(state)
     jacobian = _jacobian(motion, state, rows)
     weighted = jacobian * judgement.weights[:, None]

@@ -12,13 +12,13 @@ from glisson.core.status import Status
 from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.linear_solvers import make_direct_solver
 from glisson.mechanics.pattern import FreeSystem, Stiffness, block_pattern
-from glisson.mechanics.registration.outliers import cuts, judged
+from glisson.mechanics.registration.outliers import cuts, judged, narrowing
 from glisson.mechanics.registration.rest import Rest
 from glisson.mechanics.registration.rows import Rows
 from glisson.mechanics.registration.seen import Seen
 
 _ITERATIONS = 100
-_AT_REST, _NEARLY = 1e-4, 1e-1
+_AT_REST = 1e-3
 _MOST_DAMPING, _AFTER_FAILURE = 1e6, 1e-3
 _HOLDING = 1e-6
 """Stiffness per node (1/mm²) that keeps the matrix regular where nothing holds a rigid motion."""
@@ -58,11 +58,9 @@ class FullFit:
         Raises:
             StageFailed: it does not come to rest.
         """
-        widths = cuts(self._seen.rows(positions), self._seen.count)
-        for cut in widths:
-            found = self._descend(positions, cut, Rest(_AT_REST if cut == widths[-1] else _NEARLY))
-            positions = found.positions
-        return found
+        item = self._seen.item
+        begun = self._at(positions, cuts(self._seen.rows(positions), item))
+        return narrowing(begun, lambda state: state.rows, item, lambda state, cut: self._descend(state.positions, cut))
 
     def posterior_spread(self, found: FullState, modes: int) -> FloatArray:
         """The least certain ways to move (n, 3, modes), each by one standard deviation."""
@@ -82,7 +80,8 @@ class FullFit:
         """Give the factor's memory back."""
         self._solver.close()
 
-    def _descend(self, positions: FloatArray, cut: float, rest: Rest) -> FullState:
+    def _descend(self, positions: FloatArray, cut: FloatArray) -> FullState:
+        rest = Rest(_AT_REST)
         here = self._at(positions, cut)
         damping, growth = 1e-6, 2.0
         for _ in range(_ITERATIONS):
@@ -106,9 +105,9 @@ class FullFit:
                 return here  # no step is short enough to gain anything
         raise StageFailed("The organ does not come to rest on what was seen.", Status.ITERATION_LIMIT)
 
-    def _at(self, positions: FloatArray, cut: float) -> FullState:
+    def _at(self, positions: FloatArray, cut: FloatArray) -> FullState:
         rows = self._seen.rows(positions)
-        judgement = judged(rows, self._seen.count, cut)
+        judgement = judged(rows, cut)
         energy = self._elasticity.energy(positions) / self._energy_uj
         return FullState(positions, rows, judgement.beliefs, judgement.weights, judgement.cost + energy)
 

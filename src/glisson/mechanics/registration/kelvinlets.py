@@ -30,7 +30,7 @@ class KelvinletsParameters:
 
     centres: int = 45
     radius_mm: float = 30.0
-    strain: float = 0.05
+    strain: float = 0.1
     model_error_mm: float = 1.0
     model_error_length_mm: float = 10.0
 

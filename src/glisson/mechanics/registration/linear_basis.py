@@ -26,7 +26,7 @@ class LinearBasisParameters:
     """
 
     controls: int = 45
-    strain: float = 0.05
+    strain: float = 0.1
     model_error_mm: float = 1.0
     model_error_length_mm: float = 20.0
 

@@ -1,15 +1,21 @@
 """Points that do not belong, told by Geman and McClure's function (1987)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
-from glisson.core.arrays import FloatArray
+from glisson.core.arrays import FloatArray, IntArray
 from glisson.mechanics.registration.rows import Rows
 
 _CUT = 3.0
-_WIDEST = 20.0 * _CUT
 _NORMAL = 1.4826  # standard deviations of a normal distribution in a median of its absolute values
+_NARROWER = 0.8
+_ROUNDS = 8
+
+
+State = TypeVar("State")
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,8 +27,14 @@ class Judgement:
     cost: float
 
 
-def judged(rows: Rows, count: int, cut: float) -> Judgement:
-    """The cost of `count` observed points and the weights at which least squares have the same gradient."""
+def judged(rows: Rows, cut: FloatArray) -> Judgement:
+    """The cost of the observed points and the weights at which least squares have the same gradient.
+
+    Args:
+        rows: of what was seen.
+        cut: (p,) standard deviations beyond which each point counts less and less.
+    """
+    count = len(cut)
     squares = rows.squares(count)
     may_lie = np.bincount(rows.point, rows.robust, minlength=count) > 0.0
     share = 1.0 / (1.0 + squares / cut**2)
@@ -33,12 +45,34 @@ def judged(rows: Rows, count: int, cut: float) -> Judgement:
     return Judgement(beliefs, beliefs[rows.point] * rows.worth, cost)
 
 
-def cuts(rows: Rows, count: int) -> list[float]:
-    """So many standard deviations beyond which points count less and less, one fit after another.
+def cuts(rows: Rows, item: IntArray) -> FloatArray:
+    """So many standard deviations (p,) beyond which points are doubted.
 
-    The first is as wide as what was seen is off from the start, by its median, so that a far start finds its way and
-    points that lie are left aside from the beginning.
+    They are counted in what the points of the same observation `item` (p,) are off by their median: a feature that is
+    off as a whole is no outlier but still has to come.
     """
-    off = _NORMAL * float(np.sqrt(np.median(rows.squares(count))))
-    halvings = int(np.ceil(np.log2(np.clip(_CUT * off, _CUT, _WIDEST) / _CUT)))
-    return [_CUT * 2.0**halving for halving in range(halvings, -1, -1)]
+    squares = rows.squares(len(item))
+    off = np.array([np.sqrt(np.median(squares[item == number])) for number in range(item.max() + 1)])
+    widths: FloatArray = _CUT * np.maximum(_NORMAL * off, 1.0)[item]
+    return widths
+
+
+def narrowing(
+    start: State, rows_of: Callable[[State], Rows], item: IntArray, descend: Callable[[State, FloatArray], State]
+) -> State:
+    """Descents, each with narrower cuts than the one before, until they are as narrow as they will be.
+
+    Args:
+        start: where to begin.
+        rows_of: what was seen, against a state.
+        item: (p,) the observation of each observed point.
+        descend: from a state to the one of least cost, with cuts (p,).
+    """
+    state, cut = start, cuts(rows_of(start), item)
+    for _ in range(_ROUNDS):
+        state = descend(state, cut)
+        narrower = np.minimum(cut, cuts(rows_of(state), item))
+        if (narrower > _NARROWER * cut).all():
+            break
+        cut = narrower
+    return state

@@ -74,6 +74,11 @@ class Seen:
                 self._matches.append(SurfaceMatch(item.points_mm, errors, places.surface(item.name)))
 
     @property
+    def item(self) -> IntArray:
+        """The number of the observation (p,) that each observed point belongs to."""
+        return np.repeat(np.arange(len(self._firsts)), np.diff([*self._firsts, self.count]))
+
+    @property
     def groups(self) -> list[IntArray]:
         """Nodes (k, a) that rows may have in common, beside those of one element."""
         return [match.groups for match in self._matches if len(match.groups)]
