@@ -33,7 +33,7 @@ _RIGHT = ((-90.0, -12.0), (-62.0, 32.0), (-52.0, -42.0))
 _LEFT = ((26.0, 6.0), (54.0, 24.0))
 """Where packs may lie under a lobe of the nominal member, x and z in mm."""
 
-_PUSH_MM, _ASIDE_MM = (12.0, 20.5), 5.0
+_PUSH_MM, _ASIDE_MM = (13.0, 22.0), 5.0
 _RADIUS_MM = (30.0, 42.0)
 _APART_MM = 10.0
 _SHARE_OF_WEIGHT = (0.1, 0.4)
@@ -126,9 +126,10 @@ def _held(mesh: TetMesh, liver: SparseLiver) -> dict[str, IntArray]:
 
 
 def _pack_sets(mesh: TetMesh, packs: Sequence[Pack], fixed: IntArray) -> dict[str, IntArray]:
-    """Nodes of each pack without fixed ones; a later pack keeps off an earlier one."""
+    """Nodes of each pack, which keeps off what is fixed and off those before it."""
     surface, normals = _surface_nodes(mesh)
-    free = (normals[:, 1] > _UNDERSIDE) & ~np.isin(surface, fixed)
+    off_fixed, _ = cKDTree(mesh.nodes[fixed]).query(mesh.nodes[surface])
+    free = (normals[:, 1] > _UNDERSIDE) & (off_fixed > _APART_MM)
     sets = {}
     for number, pack in enumerate(packs):
         away = np.linalg.norm(mesh.nodes[surface] - pack.point_mm, axis=1)
