@@ -70,6 +70,14 @@ def test_boards_parallel_to_the_image_leave_the_focal_length_open():
         assert refused.value.status is Status.UNOBSERVABLE
 
 
+def test_a_view_that_is_repeated_is_none():
+    rng = np.random.default_rng(4)
+    poses = tilted_poses(rng, 5)
+    views = seen_boards(rng, [*poses, poses[1], poses[3]])
+    with pytest.raises(BadInput, match=r"again in view 6 \(as view 2\), view 7 \(as view 4\)"):
+        calibrate_camera(views, CAMERA.width, CAMERA.height)
+
+
 def test_points_of_something_else_are_left_out_and_told():
     rng = np.random.default_rng(3)
     views = seen_boards(rng, tilted_poses(rng, 12))

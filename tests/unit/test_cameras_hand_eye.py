@@ -17,10 +17,11 @@ from board_scene import (
     tracked_boards,
 )
 from glisson.core import BadInput, RigidTransform, StageFailed, Status
+from glisson.intraoperative.cameras.boards import BoardView
 from glisson.intraoperative.cameras.calibration import calibrate_camera
 from glisson.intraoperative.cameras.hand_eye import calibrate_hand_eye
 from glisson.intraoperative.cameras.hand_eye_closed_form import hand_eye_closed_form
-from glisson.intraoperative.cameras.hand_eye_equations import tracked
+from glisson.intraoperative.cameras.hand_eye_equations import HandEyeView, tracked
 from glisson.intraoperative.cameras.pivot import calibrate_pivot
 from glisson.intraoperative.cameras.scope import calibrate_shaft, scope_geometry
 from glisson.intraoperative.cameras.turning import turning
@@ -85,9 +86,87 @@ def test_poses_turned_about_one_axis_only_are_unobservable():
 def test_a_view_that_moved_is_told():
     rng = np.random.default_rng(8)
     views = tracked_boards(rng, tilted_poses(rng, 12), 1e-3, 0.2, False)
-    moved = shaken(rng, views[3].room_from_marker, 0.0, 20.0)
-    views[3] = type(views[3])(views[3].board, moved)
+    still = views[3].room_from_marker
+    views[3] = HandEyeView(views[3].board, moved(still, lambda matrix: matrix + 3.0 * ALONG))
     assert any(note.startswith("view 4 fits worse") for note in calibrate_hand_eye(CAMERA, views).notes)
+    views[3] = HandEyeView(views[3].board, moved(still, lambda matrix: matrix + 40.0 * ALONG))
+    with pytest.raises(StageFailed, match=r"^view 4 does not fit the other views"):
+        calibrate_hand_eye(CAMERA, views)
+
+
+ALONG = np.array([[0.0, 0.0, 0.0, 0.6], [0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.8], [0.0, 0.0, 0.0, 0.0]])
+IN_METRES = np.array([[1.0, 1.0, 1.0, 1e-3]] * 3 + [[1.0] * 4])
+
+
+def moved(pose, by):
+    """A pose by what is done to its 4 × 4 matrix."""
+    matrix = by(np.vstack([np.column_stack([pose.rotation, pose.translation_mm]), [0.0, 0.0, 0.0, 1.0]]))
+    return RigidTransform(pose.target, pose.source, matrix[:3, :3], matrix[:3, 3])
+
+
+def of_other_squares(board, factor):
+    return BoardView(board.name, factor * board.points_mm, board.pixels)
+
+
+DO_NOT_FIT = {
+    "exchanged": (
+        lambda views: [HandEyeView(view.board, views[other].room_from_marker, views[other].room_from_base)
+                       for view, other in zip(views, [0, 1, 2, 8, 4, 5, 6, 7, 3, 9, 10, 11], strict=True)],
+        "^view 4 and view 9 do not fit the other views",
+    ),
+    "off by one": (
+        lambda views: [HandEyeView(view.board, other.room_from_marker, other.room_from_base)
+                       for view, other in zip(views, views[1:] + views[:1], strict=True)],
+        "do not fit the images .* look at their order, direction and units",
+    ),
+    "inverse": (
+        lambda views: [HandEyeView(view.board, moved(view.room_from_marker, np.linalg.inv), view.room_from_base)
+                       for view in views],
+        "do not fit the images",
+    ),
+    "metres": (
+        lambda views: [HandEyeView(view.board, *(moved(pose, lambda matrix: IN_METRES * matrix)
+                       for pose in (view.room_from_marker, view.room_from_base) if pose is not None))
+                       for view in views],
+        "moves (1.0[0-3]e.03|9[89][0-9]) times as far in the images",
+    ),
+    "squares of 6 mm told as 5 mm": (
+        lambda views: [HandEyeView(of_other_squares(view.board, 5.0 / 6.0), view.room_from_marker, view.room_from_base)
+                       for view in views],
+        "moves 0.8[1-5]* times as far",
+    ),
+    "squares of 5 mm told as 6 mm": (
+        lambda views: [HandEyeView(of_other_squares(view.board, 1.2), view.room_from_marker, view.room_from_base)
+                       for view in views],
+        "moves 1.(19|2|21) times as far",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", DO_NOT_FIT)
+@pytest.mark.parametrize("with_base", [False, True])
+def test_poses_that_do_not_belong_to_the_images_are_refused(fault, with_base):
+    spoilt, sentence = DO_NOT_FIT[fault]
+    rng = np.random.default_rng(10)
+    views = tracked_boards(rng, tilted_poses(rng, 12), 1e-3, 0.2, with_base)
+    with pytest.raises(StageFailed, match=sentence) as refused:
+        calibrate_hand_eye(CAMERA, spoilt(views))
+    assert refused.value.status is Status.STAGNATED
+
+
+def test_a_board_that_moved_with_its_marker_or_took_the_scope_s_place_is_refused():
+    rng = np.random.default_rng(11)
+    views = tracked_boards(rng, tilted_poses(rng, 12), 1e-3, 0.2, True)
+    with pytest.raises(StageFailed, match="whether the board moved"):
+        calibrate_hand_eye(CAMERA, [HandEyeView(view.board, view.room_from_marker) for view in views])
+    with pytest.raises(StageFailed, match="do not fit the images"):
+        calibrate_hand_eye(CAMERA, [HandEyeView(one.board, one.room_from_base, one.room_from_marker) for one in views])
+
+
+def test_a_coarse_tracker_is_not_refused():
+    """0.5° and 2 mm, as electromagnetic trackers err beside metal."""
+    for seed in range(10):
+        assert 1.0 < hand_eye(seed, 12, sigma_rad=np.radians(0.5), sigma_mm=2.0).tracker_sigma_mm < 3.0
 
 
 def test_views_that_cannot_be_used():
@@ -176,6 +255,14 @@ def test_geometry_of_an_oblique_scope():
     assert scope.tip_off_shaft_mm < 1.5
     exact = scope_geometry(CAMERA_FROM_MARKER, tip, np.zeros((3, 3)), None)
     assert exact.tip_mm == pytest.approx(tip_in_camera, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("tip_mm", "sentence"), [((0.0, 3.0, -630.0), "630 mm behind"), ((90.0, 0.0, 5.0), "90 mm be")]
+)
+def test_a_tip_where_no_scope_has_it_is_refused(tip_mm, sentence):
+    with pytest.raises(BadInput, match=sentence):
+        scope_geometry(CAMERA_FROM_MARKER, CAMERA_FROM_MARKER.inverse().apply(tip_mm), np.zeros((3, 3)), None)
 
 
 def test_a_scope_hardly_spun_or_swung_is_refused():

@@ -112,7 +112,10 @@ def test_pivot_and_scope_of_poses(tmp_path, glisson):
     assert (code, said["used"]) == (0, 20)
     assert np.linalg.norm(np.array(said["tip_mm"]) - tip) < 0.2
     tilted = Rotation.from_rotvec([0.0, np.radians(-30.0), 0.0]).as_matrix()
-    hand_eye = RigidTransform("camera", "marker", tilted, [0.0, 0.0, -250.0], np.diag([1e-3] * 3 + [0.1] * 3) ** 2)
+    # The glass tip is 5 mm before the centre of projection.
+    hand_eye = RigidTransform(
+        "camera", "marker", tilted, [0.0, 0.0, 5.0] - tilted @ tip, np.diag([1e-3] * 3 + [0.1] * 3) ** 2
+    )
     write_pose(tmp_path / "hand-eye.toml", hand_eye)
     code, said = glisson(
         "calibrate", "scope", "--hand-eye", tmp_path / "hand-eye.toml", "--tip-poses", tmp_path / "swing",

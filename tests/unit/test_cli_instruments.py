@@ -60,6 +60,15 @@ def test_the_instrument_of_a_picture(tmp_path: Path, glisson: Glisson, views: Wh
     assert np.linalg.norm(np.array(said["tip_mm"]) - true) < 4.0 * np.sqrt(np.trace(said["tip_covariance_mm2"]))
     assert said["room"] is None
     assert read_photograph(said["picture"]).shape == (960 + 64, 1280, 3)
+    assert glisson("instruments", "add", "hook", "--library", tmp_path / "one.toml", "--length-mm", "330")[0] == 0
+    words = ["instruments", "recognise", tmp_path / "view.png", "--trocar", EXAMPLE_TROCAR]
+    code, said = glisson(*words, "--library", tmp_path / "one.toml")
+    assert (code, said["status"]) == (2, "bad_input"), said
+    for place, sentence in (("view.png", "would be overwritten"), ("seen.jpg", "ends in .png")):
+        code, said = glisson(*words, "--out", tmp_path / place)
+        assert code == 2
+        assert sentence in said["message"]
+    assert read_photograph(tmp_path / "view.png").shape == (960, 1280, 3)
 
 
 @pytest.mark.parametrize(
@@ -89,15 +98,16 @@ def test_what_cannot_be_is_one_sentence(
 
 
 def test_a_video_becomes_a_timeline_and_tips_a_plane(tmp_path: Path, glisson: Glisson, views: WheelViews) -> None:
-    """The hook for a second, nothing, then the pointer draws on a ball about its pivot."""
+    """The hook for a second, nothing, then the pointer draws an arc in the plane y = 0."""
     frames, tips = [views.view(scene_of("hook"))] * 4 + [np.full((960, 1280, 3), 90, dtype=np.uint8)] * 8, []
     for step in range(12):
         scene = scene_of("pointer")
         angle = np.radians(-4.0 + 8.0 * step / 11.0)
         out = np.array([np.sin(angle), 0.0, np.cos(angle)])
+        depth = 130.0 - 10.0 * (2.0 * step / 11.0 - 1.0) ** 2
         x = np.array([np.cos(angle), 0.0, -np.sin(angle)])
         pose = RigidTransform(
-            "trocar", "instrument", np.column_stack([x, np.cross(-out, x), -out]), TROCAR.pivot_mm + 130.0 * out
+            "trocar", "instrument", np.column_stack([x, np.cross(-out, x), -out]), TROCAR.pivot_mm + depth * out
         )
         frames.append(views.view(replace(scene, trocar_from_instrument=pose)))
         tips.append(pose.apply(scene.instrument.tip_mm))
@@ -121,8 +131,9 @@ def test_a_video_becomes_a_timeline_and_tips_a_plane(tmp_path: Path, glisson: Gl
     assert code == 0, said
     length = np.linalg.norm(tips[-1] - tips[0])
     assert said["distances"][0]["mm"] == pytest.approx(length, abs=3.0 * said["distances"][0]["sigma_mm"])
-    assert said["strokes"]["cut"]["mm"] == pytest.approx(length, rel=0.1)
-    # The tips lie in the plane y = 0.
+    drawn = np.linalg.norm(np.diff(tips, axis=0), axis=1).sum()
+    assert said["strokes"]["cut"]["mm"] == pytest.approx(drawn, rel=0.1)
+    assert said["status"] == "converged"
     tilt = np.degrees(np.arccos(min(said["plane"]["normal"][1], 1.0)))
     assert tilt < 3.0 * said["plane"]["tilt_sigma_deg"]
     items = {item.name: item for item in read_observations(tmp_path / "drawn" / "observations.json").items}
@@ -140,6 +151,8 @@ def test_a_video_becomes_a_timeline_and_tips_a_plane(tmp_path: Path, glisson: Gl
         (["--instrument", "pointer", "--stroke", "a,3,6", "--resection", "b", "--towards", "0,1,0"], "no stroke 'b'"),
         (["--instrument", "pointer", "--stroke", "a,6,3"], "NAME,FROM,TO"),
         (["--instrument", "pointer"], "at least one"),
+        (["--instrument", "pointer", "--stroke", "a,3,6", "--resection", "a", "--towards", "0,0,0"], "the zero vector"),
+        (["--instrument", "pointer", "--stroke", "a,3,6", "--resection", "a", "--towards", "1,0,0"], "tell the side"),
     ):
         code, said = glisson("pointer", out / "tips.json", *wrong)
         assert code == 2, said
@@ -148,13 +161,15 @@ def test_a_video_becomes_a_timeline_and_tips_a_plane(tmp_path: Path, glisson: Gl
 
 def test_markers_are_printed(tmp_path: Path, glisson: Glisson) -> None:
     code, said = glisson("markers", "wheel", "hook", "fan retractor", "--out", tmp_path / "wheels.pdf")
-    assert (code, said["pages"], said["papers"]) == (0, 2, ["A4", "A4"])
+    assert (code, said["status"], said["pages"], said["papers"]) == (0, "converged", 2, ["A4", "A4"])
     assert (tmp_path / "wheels.pdf").read_bytes().startswith(b"%PDF")
     layout = EXAMPLE_TROCAR.with_name("layout.toml")
     code, said = glisson("markers", "crosses", layout, "--out", tmp_path / "crosses.pdf")
     assert (code, said["pages"] % 5) == (0, 0)
     code, said = glisson("markers", "board", "charuco:19x26:5:4:4X4_250", "--out", tmp_path / "board.pdf")
     assert (code, said["papers"]) == (0, ["A4"])
+    code, said = glisson("markers", "board", "chessboard:9x6:20", "--out", tmp_path / "board.jpg")
+    assert (code, said["status"]) == (2, "bad_input")
     code, said = glisson("markers", "board", "chessboard:9x6:90", "--out", tmp_path / "board.pdf")
     assert (code, said["status"]) == (2, "bad_input")
     assert "does not fit on A3" in said["message"]

@@ -13,6 +13,7 @@ from glisson.cli import main as cli
 from glisson.cli.command import Command
 from glisson.cli.console import Answer
 from glisson.cli.main import main
+from glisson.cli.options import add_case
 from glisson.cli.progress import StageLines
 from glisson.core.errors import BadInput, StageFailed
 from glisson.core.status import Status
@@ -31,13 +32,17 @@ def glisson(capfd: pytest.CaptureFixture[str]) -> Spoken:
     return run
 
 
-def behaving(monkeypatch: pytest.MonkeyPatch, what: Callable[[StageLines], Answer]) -> None:
+def behaving(
+    monkeypatch: pytest.MonkeyPatch,
+    what: Callable[[StageLines], Answer],
+    add_arguments: Callable[[argparse.ArgumentParser], None] = lambda parser: None,
+) -> None:
     """Put a command in the place of "techniques" that does `what`."""
 
     def run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
         return what(lines)
 
-    command = Command("techniques", "  example", lambda parser: None, run, ("rows",))
+    command = Command("techniques", "  example", add_arguments, run, ("rows",))
     monkeypatch.setattr(cli, "_command", lambda name: command if name == "techniques" else None)
 
 
@@ -55,7 +60,7 @@ def raising(error: BaseException) -> Callable[[StageLines], Answer]:
         (BadInput("The scan is empty."), 2, "bad_input", "The scan is empty."),
         (StageFailed("It slides along x.", Status.SINGULAR), 1, "singular", "It slides along x."),
         (WriteFailed("The disk is full."), 1, None, "The disk is full."),
-        (KeyboardInterrupt(), 130, None, "Interrupted in the stage mesh; what was done before it is kept"),
+        (KeyboardInterrupt(), 130, None, "Interrupted in the stage mesh."),
         (MemoryError(), 1, None, "not enough memory"),
         (FileNotFoundError(2, "No such file or directory", "x.nii"), 1, None, "x.nii: No such file"),
         (ZeroDivisionError("division\nby zero"), 1, None, "not foreseen (ZeroDivisionError: division by zero)"),
@@ -85,6 +90,11 @@ def test_every_outcome_is_one_sentence_and_an_exit_code(
     else:
         assert out == ""
     assert words in err
+
+
+def test_an_interruption_in_a_case_says_what_is_kept(glisson: Spoken, monkeypatch: pytest.MonkeyPatch) -> None:
+    behaving(monkeypatch, raising(KeyboardInterrupt()), add_case)
+    assert "Interrupted in the stage mesh; what was done before it is kept." in glisson("techniques", "case")[2]
 
 
 def test_debug_shows_where_an_unforeseen_error_came_from(glisson: Spoken, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -169,3 +179,10 @@ def test_a_closed_pipe_is_no_trouble() -> None:
     command = f"{sys.executable} -m glisson.cli.main --help | true; exit ${{PIPESTATUS[0]}}"
     ended = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
     assert "Traceback" not in ended.stderr
+
+
+@pytest.mark.parametrize(("words", "code"), [("--version", 0), ("paint --json", 2)])
+def test_a_closed_stdout_is_no_trouble(words: str, code: int) -> None:
+    command = f"{sys.executable} -m glisson.cli.main {words} >&-"
+    ended = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
+    assert (ended.returncode, "Traceback" in ended.stderr) == (code, False), ended.stderr

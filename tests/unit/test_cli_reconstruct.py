@@ -53,6 +53,15 @@ def test_a_session_from_pictures_alone(tmp_path, table, glisson):
     ball = (radius < 43.0) & (surface.points_mm[:, 2] > 5.0)
     assert np.median(np.abs(radius[ball] - 40.0)) < 0.6
     assert (tmp_path / "seen" / "views.png").is_file()
+    (folder / "view1.png").replace(folder / "views.png")
+    table["views"][0]["image"] = "views.png"
+    code, said = glisson("reconstruct", write_session(folder, table))
+    assert code == 2
+    assert "would be overwritten" in said["message"]
+    table["views"][0]["image"] = table["views"][1]["image"]
+    code, said = glisson("reconstruct", write_session(folder, table))
+    assert code == 2
+    assert "view 1 and view 2 have the same picture" in said["message"]
 
 
 def test_a_direction_without_roll_will_do(tmp_path, table, glisson):
@@ -104,6 +113,18 @@ def _no_picture(table):
     table["views"][0]["image"] = "nowhere.png"
 
 
+def _both(table):
+    table["views"][0]["direction"] = [0.0, 0.0, 1.0]
+
+
+def _outside(table):
+    table["views"][1]["landmarks_px"]["point 3"] = [5000.0, 100.0]
+
+
+def _one_name(table):
+    table["views"][1]["name"] = table["views"][0]["name"]
+
+
 @pytest.mark.parametrize(
     ("spoil", "code", "status", "words"),
     [
@@ -116,6 +137,9 @@ def _no_picture(table):
         (_no_sigma, 2, "bad_input", "sigma_position_mm must be positive"),
         (_unknown_key, 2, "bad_input", "unknown key 'views[0].tip'"),
         (_no_picture, 2, "bad_input", "nowhere.png"),
+        (_both, 2, "bad_input", "views[0].rotation and views[0].direction: give one of the two"),
+        (_outside, 2, "bad_input", "view 2: 'point 3' at 5000, 100 px is outside the image of"),
+        (_one_name, 2, "bad_input", "Two views have the name 'view 1'"),
     ],
 )
 def test_bad_sessions_get_a_sentence(tmp_path, table, glisson, spoil, code, status, words):

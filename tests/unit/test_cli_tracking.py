@@ -47,7 +47,7 @@ def test_a_video_is_followed_and_its_breaths_are_told(recording: Recording, glis
     off = tracks.places - tracks.places[0] - (truth - truth[0])[:, number]
     assert np.nanmedian(np.linalg.norm(off, axis=2)) < 0.05
 
-    code, said = glisson("breathing", tmp_path / "tracks.csv", "--out", tmp_path)
+    code, said = glisson("breathing", tmp_path / "liver.tracks.csv", "--out", tmp_path)
     assert code == 0, said
     assert said["status"] == "converged"
     assert said["breaths"] >= 2
@@ -66,11 +66,21 @@ def test_tracks_are_in_mm_by_a_camera(recording: Recording, glisson: Glisson, tm
     words = ["--at", f"{u:.2f},{v:.2f}", "--out", tmp_path, "--camera", tmp_path / "camera.toml"]
     code, said = glisson("track", path, *words, "--distance-mm", f"{distance:.3f}")
     assert (code, said["unit"]) == (0, "mm"), said
+    assert said["file"] == str(tmp_path / "liver.tracks.csv")
     place = read_tracks(said["file"]).places[0, 0]
     assert place == pytest.approx(distance * ray_slopes(CAMERA, [[u, v]])[0], abs=0.01)
     code, said = glisson("track", path, *words)
     assert code == 2
     assert "belong together" in said["message"]
+    write_camera(tmp_path / "camera.toml", Camera(1920, 1080, [1300.0, 1300.0], [960.0, 540.0]))
+    code, said = glisson("track", path, *words, "--distance-mm", f"{distance:.3f}")
+    assert (code, said["status"]) == (2, "bad_input")
+    assert "480 × 270 px, its camera was calibrated at 1920 × 1080 px" in said["message"]
+    write_camera(tmp_path / "camera.toml", Camera(240, 135, [160.0, 160.0], [120.0, 67.0]))
+    write_tracks(tmp_path / "still.csv", strokes(5.0, 0.0))
+    code, said = glisson("breathing", tmp_path / "still.csv", *words[2:], "--distance-mm", "90")
+    assert code == 2
+    assert "leave the camera's image of 240 × 135 px" in said["message"]
 
 
 def test_markers_may_be_given(recording: Recording, glisson: Glisson, tmp_path: Path) -> None:
@@ -106,6 +116,9 @@ def test_a_video_that_ends_early_is_used_as_far_as_it_goes(
         (["track", "liver.avi", "--technique", "guess"], 2, "no marker-tracker technique"),
         (["breathing", "none.csv"], 2, "cannot be read"),
         (["breathing", "still.csv"], 1, "repeats itself"),
+        (["breathing", "still.csv", "--exhaled-at", "0"], 1, "repeats itself"),
+        (["breathing", "still.csv", "--exhaled-at", "500"], 2, "in the recording, from 0 to 3.98 s, not 500 s"),
+        (["breathing", "still.csv", "--exhaled-at", "nan"], 2, "in the recording"),
         (["breathing", "still.csv", "still.csv"], 2, "--rate-hz"),
         (["breathing", "still.csv", "--rate-hz", "4", "--rate-hz", "5"], 2, "one for each"),
         (["breathing", "still.csv", "--rate-hz", "0"], 2, "--rate-hz"),
@@ -150,4 +163,4 @@ def test_rates_are_compared_and_the_plateau_is_told(glisson: Glisson, tmp_path: 
     assert low <= 9.2 <= high
     assert [row["rate_hz"] for row in said["rates"]] == rates.tolist()
     assert said["displacement"] == pytest.approx(4.0, rel=0.02)
-    assert (tmp_path / "breathing.png").read_bytes().startswith(b"\x89PNG")
+    assert Path(said["picture"]).read_bytes().startswith(b"\x89PNG")

@@ -44,6 +44,28 @@ def assert_alike(found, sampled):
     assert np.abs((found - sampled) / np.outer(scale, scale)).max() < 0.05
 
 
+@pytest.mark.parametrize(
+    ("row", "column", "value", "sentence"),
+    [(0, 0, -1.0, "negative variance"), (0, 1, 0.5, "symmetric"), (5, 5, 0.0, None), (4, 4, 1e-12, None)],
+)
+def test_a_covariance_must_be_one(row, column, value, sentence):
+    def pose_of(spread):
+        return RigidTransform("room", "camera", np.eye(3), np.zeros(3), spread)
+
+    for size, made in ((6, pose_of), (9, lambda spread: Camera(640, 480, [5e2] * 2, [3e2] * 2, np.zeros(5), spread))):
+        spread = np.eye(size)
+        spread[row, column] = value
+        if sentence is None:
+            np.testing.assert_array_equal(made(spread).covariance, spread)
+            continue
+        with pytest.raises(BadInput, match=sentence):
+            made(spread)
+        spread = np.eye(size)
+        spread[:3, :3] = [[1.0, 0.9, -0.9], [0.9, 1.0, 0.9], [-0.9, 0.9, 1.0]]
+        with pytest.raises(BadInput, match="semi-definite"):
+            made(spread)
+
+
 def test_covariance_of_an_inverse_and_of_a_product_as_drawn():
     rng = np.random.default_rng(4)
     a, b = pose(rng, "camera", "room"), pose(rng, "room", "patient")

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from glisson.core.errors import BadInput
+from glisson.core.status import Status
 from glisson.core.tip_track import TipTrack
 from glisson.core.transform import RigidTransform
 from glisson.intraoperative.pointer.measuring import as_observation, distance, pointed_at, stroke_length
@@ -83,6 +84,15 @@ def test_the_plane_of_a_line_errs_as_it_says():
         assert found.rms_mm == pytest.approx(0.5, rel=0.3)
     assert np.mean(np.square(tilts)) == pytest.approx(np.mean(predicted), rel=0.15)
     assert found.covariance[2, 2] > 0.25
+
+
+def test_a_side_must_be_told_and_a_tilt_be_known():
+    for nowhere in ([0.0, 0.0, 0.0], [1.0, 0.0, 0.05]):
+        with pytest.raises(BadInput, match="the removed side"):
+            plane_of(track(circle(40.0)), np.array(nowhere))
+    assert plane_of(track(circle(40.0)), np.array([1.0, 0.0, 0.3])).status is Status.CONVERGED
+    line = np.linspace([0.0, 0.0, 0.0], [30.0, 0.0, 0.0], 50) + 0.3 * RNG.standard_normal((50, 3))
+    assert plane_of(track(line), np.array([0.0, 0.0, 1.0])).status is Status.UNOBSERVABLE
 
 
 def test_tips_that_are_seen_badly_count_less():

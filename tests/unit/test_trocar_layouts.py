@@ -68,6 +68,9 @@ def test_a_survey_finds_where_crosses_hang(hung):
     survey = survey_layout(images, CAMERA, designed, Distance("cross 2", "cross 4", length, 0.5))
     assert survey.size_factor == pytest.approx(1.005, abs=4.0 * survey.size_sigma)
     assert survey.size_sigma < 0.002
+    assert survey.notes == ()
+    wrong = survey_layout(images, CAMERA, designed, Distance("cross 2", "cross 4", 1.05 * length, 0.5))
+    assert "1.05" in wrong.notes[0]
     count = len(true)
     moved = in_frame_of(
         [cross.room_from_cross for cross in designed.crosses],
@@ -84,9 +87,13 @@ def test_a_survey_finds_where_crosses_hang(hung):
 def test_what_a_survey_cannot_do(hung):
     designed, _, images = hung
     with pytest.raises(StageFailed, match="is not seen beside another in two images"):
+        survey_layout([images[0], np.zeros_like(images[0])], CAMERA, designed, Distance("cross 1", "cross 2", 1000.0))
+    with pytest.raises(BadInput, match="two images at least"):
         survey_layout(images[:1], CAMERA, designed, Distance("cross 1", "cross 2", 1000.0))
     with pytest.raises(BadInput, match="between two of the crosses"):
         survey_layout(images, CAMERA, designed, Distance("cross 1", "door", 1000.0))
+    with pytest.raises(BadInput, match=r"mm apart, not 1.7 mm; give the measured distance of their middles in mm"):
+        survey_layout(images, CAMERA, designed, Distance("cross 2", "cross 4", 1.7))
     with pytest.raises(BadInput, match="positive"):
         survey_layout(images, CAMERA, designed, Distance("cross 1", "cross 2", float("nan")))
 
@@ -110,10 +117,27 @@ def test_commands(hung, tmp_path, capfd):
     write_layout(tmp_path / "true.toml", true)
     given += ["--layout", str(tmp_path / "true.toml"), "--out", str(tmp_path / "seen.png"), "--json"]
     assert main(["localize", names[0], *given]) == 0
-    told = json.loads(capfd.readouterr().out)
+    said = capfd.readouterr()
+    assert "localize  running" in said.err
+    told = json.loads(said.out)
     assert told["status"] == "converged"
     assert np.array(told["covariance"]).shape == (6, 6)
     assert read_photograph(tmp_path / "seen.png").shape == (544, 640, 3)
+    assert len(told["notes"]) == 2
+    given[-2] = names[0]
+    before = (tmp_path / "view0.png").read_bytes()
+    assert main(["localize", names[0], *given]) == 2
+    assert "would be overwritten" in json.loads(capfd.readouterr().out)["message"]
+    assert (tmp_path / "view0.png").read_bytes() == before
+    given[-2] = str(tmp_path / "seen.jpg")
+    assert main(["localize", names[0], *given]) == 2
+    assert "ends in .png" in json.loads(capfd.readouterr().out)["message"]
+    assert main([
+        "layout", "survey", *names, *given[:2], "--layout", given[3], "--distance", "cross 2,cross 4,1000", "--out",
+        names[3], "--json",
+    ]) == 2  # fmt: skip
+    assert "would be overwritten" in json.loads(capfd.readouterr().out)["message"]
+    given[-2] = str(tmp_path / "seen.png")
     write_photograph(tmp_path / "mirrored.png", images[0][:, ::-1])
     assert main(["localize", str(tmp_path / "mirrored.png"), *given]) == 2
     told = json.loads(capfd.readouterr().out)

@@ -66,6 +66,20 @@ def test_a_room_in_use_is_right_or_flagged(localiser):
     assert good >= 5
 
 
+def test_what_the_bounds_do_not_count_is_told(localiser):
+    places = tuple(
+        replace(cross, room_from_cross=replace(cross.room_from_cross, covariance=1e-6 * np.eye(6)))
+        for cross in trocar_views.layout().crosses
+    )
+    layout, camera = CrossLayout(places), replace(CAMERA, covariance=1e-8 * np.eye(9))
+    image = trocar_views.view(layout, trocar_views.pose(2), 2)
+    assert localiser.localise(image, camera, layout).notes == ()
+    told = localiser.localise(image, CAMERA, trocar_views.layout()).notes
+    assert [note.partition(" no covariance")[0] for note in told] == ["The camera has", "The crosses' places have"]
+    other_lens = localiser.localise(image, replace(camera, distortion=np.zeros(5)), layout)
+    assert "times as far off as they should be" in other_lens.notes[0]
+
+
 def test_ink_that_has_grown_is_told_from_a_pose_that_is_off(localiser):
     layout, true = trocar_views.layout(), trocar_views.pose(2)
     noises, counts = [], []
@@ -95,6 +109,8 @@ def test_images_that_allow_no_pose(localiser):
     nothing = localiser.localise(np.zeros_like(image), CAMERA, layout)
     assert nothing.status is Status.UNOBSERVABLE
     assert "No cross" in nothing.message
+    grey = localiser.localise(np.repeat(image.mean(axis=2, keepdims=True).astype(np.uint8), 3, axis=2), CAMERA, layout)
+    assert "which is grey" in grey.message
     one = localiser.localise(image, CAMERA, CrossLayout(layout.crosses[:1]))
     assert one.status is Status.UNOBSERVABLE
     assert "Only one cross" in one.message
@@ -127,7 +143,9 @@ def test_a_layout_that_is_not_the_rooms_is_told(localiser):
 def test_an_image_of_another_camera_is_refused(localiser):
     layout = trocar_views.layout()
     for image in (np.zeros((240, 320, 3), dtype=np.uint8), np.zeros((480, 640), dtype=np.uint8)):
-        with pytest.raises(BadInput, match="its camera takes"):
+        with pytest.raises(
+            BadInput, match=r"(320 × 240 px|640 × 480 px and grey), but its camera takes colour images of 640 × 480 px"
+        ):
             localiser.localise(image, CAMERA, layout)
 
 

@@ -11,7 +11,7 @@ from glisson.cli.command import Command
 from glisson.cli.console import Answer
 from glisson.cli.options import positive_from_text
 from glisson.cli.progress import StageLines
-from glisson.cli.track import add_marker_options, followed, unit_of
+from glisson.cli.track import TRACKS, add_marker_options, followed, unit_of
 from glisson.core.errors import BadInput
 from glisson.core.status import Status
 from glisson.core.tracks import Tracks
@@ -25,7 +25,8 @@ from glisson.io.track_files import read_tracks
 from glisson.navigation.figures.picture import Picture
 from glisson.studies.page import png
 
-PICTURE = "breathing.png"
+PICTURE = ".breathing.png"
+"""What follows the name of the (first) recording in that of the picture."""
 _WITHIN = {"px": 7.0, "mm": 1.0}
 """Frames in which breathing has moved every marker by no more than this are let through, without --within."""
 
@@ -40,7 +41,7 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recording", metavar="VIDEO|TRACKS", nargs="+", help="a video, or the .csv of glisson track")
     add_marker_options(parser)
     parser.add_argument(
-        "--exhaled-at", metavar="S", help="a moment (s) of exhalation, where it can't be told otherwise"
+        "--exhaled-at", metavar="S", type=float, help="a moment (s) of exhalation, where it can't be told otherwise"
     )
     parser.add_argument("--within", metavar="LENGTH", help="frames with less breathing than this are used (1 mm, 7 px)")
     parser.add_argument(
@@ -62,9 +63,13 @@ def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
     in_unit = unit_of(arguments)
     recordings = [_tracks(path, arguments, lines) for path in arguments.recording]
     notes = [note for _, found in recordings for note in found]
-    out = Path(arguments.out) if arguments.out else Path(arguments.recording[0]).parent
     tracks = [in_unit(made) for made, _ in recordings]
-    return _by_rate(tracks, rates, arguments, notes, out) if rates else _by_breath(tracks[0], arguments, notes, out)
+    first = Path(arguments.recording[0])
+    out = Path(arguments.out) if arguments.out else first.parent
+    picture = out / f"{first.name.removesuffix(TRACKS).removesuffix(first.suffix)}{PICTURE}"
+    if rates:
+        return _by_rate(tracks, rates, arguments, notes, picture)
+    return _by_breath(tracks[0], arguments, notes, picture)
 
 
 def _tracks(path: str, arguments: argparse.Namespace, lines: StageLines) -> tuple[Tracks, tuple[str, ...]]:
@@ -76,16 +81,15 @@ def _tracks(path: str, arguments: argparse.Namespace, lines: StageLines) -> tupl
     return tracks, notes
 
 
-def _by_breath(tracks: Tracks, arguments: argparse.Namespace, notes: Sequence[str], out: Path) -> Answer:
-    moment = None if arguments.exhaled_at is None else positive_from_text(arguments.exhaled_at, "--exhaled-at")
+def _by_breath(tracks: Tracks, arguments: argparse.Namespace, notes: Sequence[str], picture: Path) -> Answer:
     within = positive_from_text(arguments.within or str(_WITHIN[tracks.unit]), "--within")
-    cycles = find_cycles(tracks, moment)
+    cycles = find_cycles(tracks, arguments.exhaled_at)
     model = fit_breathing(tracks, cycles)
     gate = np.flatnonzero(model.gate(tracks.times_s, within))
     excursions = model.excursions()
     known = np.flatnonzero(np.isfinite(excursions))
     widest = int(known[np.argmax(excursions[known])])
-    _keep(draw_breathing(tracks, cycles, model, widest), out)
+    _keep(draw_breathing(tracks, cycles, model, widest), picture)
     notes = [*notes, *cycles.notes]
     mean, spread = float(excursions[known].mean()), _spread(cycles, excursions[known])
     values = dict.fromkeys(_KEYS) | {
@@ -96,7 +100,7 @@ def _by_breath(tracks: Tracks, arguments: argparse.Namespace, notes: Sequence[st
         "exhalation_frames": _nearest(tracks, cycles.exhalations_s),
         "inhalation_frames": _nearest(tracks, cycles.inhalations_s), "inhalation_phase": cycles.inhalation_phase,
         "markers": _markers(model), "displacement": mean, "displacement_spread": spread,
-        "gate_frames": gate.tolist(), "notes": notes, "picture": str(out / PICTURE),
+        "gate_frames": gate.tolist(), "notes": notes, "picture": str(picture),
     }  # fmt: skip
     left = float(np.sqrt(np.nanmean(np.trace(model.covariance, axis1=1, axis2=2))))
     text = [
@@ -105,13 +109,13 @@ def _by_breath(tracks: Tracks, arguments: argparse.Namespace, notes: Sequence[st
         f"left      {left:.2f} {tracks.unit} (root mean square) once breathing and drift are taken away",
         f"frames    {len(gate)} of {len(tracks.times_s)} lie within {within:g} {tracks.unit} of full exhalation",
         *(f"look at   {note}" for note in notes),
-        f"picture   {out / PICTURE}",
+        f"picture   {picture}",
     ]
     return Answer(values, "\n".join(text), 1 if cycles.notes else 0)
 
 
 def _by_rate(
-    tracks: Sequence[Tracks], rates: Sequence[float], arguments: argparse.Namespace, notes: Sequence[str], out: Path
+    tracks: Sequence[Tracks], rates: Sequence[float], arguments: argparse.Namespace, notes: Sequence[str], picture: Path
 ) -> Answer:
     exposure = None
     if arguments.exposure_ms is not None:
@@ -120,15 +124,15 @@ def _by_rate(
         raise BadInput("Some recordings are in px and some in mm; bring them to one unit.")
     found = [displacement_at(recording, rate, exposure) for recording, rate in zip(tracks, rates, strict=True)]
     plateau = find_plateau(found)
-    _keep(draw_rates(found, plateau, tracks[0].unit), out)
+    _keep(draw_rates(found, plateau, tracks[0].unit), picture)
     values = dict.fromkeys(_KEYS) | {
         "status": plateau.status, "message": plateau.sentence, "unit": tracks[0].unit,
         "rates": [_rate(displacement) for displacement in found],
         "plateau_hz": plateau.rate_hz, "interval_hz": plateau.interval_hz, "displacement": plateau.displacement,
-        "notes": list(notes), "picture": str(out / PICTURE),
+        "notes": list(notes), "picture": str(picture),
     }  # fmt: skip
     text = [_rate_line(displacement, tracks[0].unit) for displacement in found]
-    text += [f"plateau   {plateau.sentence}", *(f"look at   {note}" for note in notes), f"picture   {out / PICTURE}"]
+    text += [f"plateau   {plateau.sentence}", *(f"look at   {note}" for note in notes), f"picture   {picture}"]
     return Answer(values, "\n".join(text), 0 if plateau.status.is_good else 1)
 
 
@@ -168,15 +172,15 @@ def _nearest(tracks: Tracks, moments: Any) -> list[int]:
     return [int(np.argmin(np.abs(tracks.times_s - moment))) for moment in moments]
 
 
-def _keep(shown: Picture, out: Path) -> None:
-    with atomic_path(out / PICTURE) as temporary:
+def _keep(shown: Picture, path: Path) -> None:
+    with atomic_path(path) as temporary:
         temporary.write_bytes(png(shown))
 
 
 COMMAND = Command(
     "breathing",
     "  glisson breathing liver.mp4 --mm-per-px 0.14\n"
-    "  glisson breathing tracks.csv --exhaled-at 3.2 --json\n"
+    "  glisson breathing liver.tracks.csv --exhaled-at 3.2 --json\n"
     "  glisson breathing slow.mp4 fast.mp4 … --rate-hz 4 --rate-hz 4.5 … --exposure-ms 8",
     _add_arguments,
     _run,

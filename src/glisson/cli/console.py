@@ -36,12 +36,12 @@ def private_stdout() -> Iterator[TextIO]:
 
     This holds for C++ libraries too: it is the file descriptor that is turned round.
     """
-    sys.stdout.flush()
-    try:
-        kept = os.dup(1)
-    except OSError:  # started with stdout closed
-        yield sys.stdout
+    if sys.stdout is None:  # started with stdout closed: nobody reads, and no other file may take its number
+        with open(os.devnull, "w", encoding="utf-8") as nowhere:
+            yield nowhere
         return
+    sys.stdout.flush()
+    kept = os.dup(1)
     previous = sys.stdout
     os.dup2(2, 1)
     with os.fdopen(kept, "w", encoding="utf-8", errors="backslashreplace") as answers:

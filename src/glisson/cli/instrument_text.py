@@ -30,7 +30,8 @@ def library_answer(
         lines = [f"added     {added.name}: {', '.join(added.colours)}; print it with glisson markers wheel"]
     if alike is not None:
         values["alike"] = [entry.sentence for entry in alike]
-        lines = values["alike"] or [f"All {len(rows)} codes can be told apart, turned or mirrored."]
+        good = f"The codes of {len(rows)} instruments" if len(rows) != 1 else "The turns of the only code"
+        lines = values["alike"] or [f"{good} can be told apart, mirrored or not."]
     return Answer(values, "\n".join(lines), 1 if alike else 0)
 
 

@@ -14,6 +14,15 @@ from glisson.framework.instrument_timeline import timeline_of_video
 from glisson.framework.instruments import add_instrument, library_or_example, recognise_picture
 from glisson.intraoperative.instruments.codes import alike_codes
 
+_EXAMPLES = {
+    "list": "  glisson instruments list --library instruments.toml",
+    "check": "  glisson instruments check --library instruments.toml",
+    "add": "  glisson instruments add grasper --length-mm 330 --library instruments.toml",
+    "recognise": "  glisson instruments recognise view.png --trocar trocar.toml --library instruments.toml "
+    "--layout layout.toml",
+    "timeline": "  glisson instruments timeline trocar.mp4 --trocar trocar.toml --every 5 --out timeline --json",
+}
+
 _KEYS = ("instrument", "code", "distance_mm", "angle_deg", "tip_mm", "tip_covariance_mm2", "room", "picture", "seconds")
 
 
@@ -30,7 +39,10 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
         "timeline": (_add_timeline, "tell when which instrument was in use in a video of a trocar's camera"),
     }
     for name, (add, summary) in about.items():
-        made = actions.add_parser(name, help=summary, description=summary, allow_abbrev=False)
+        made = actions.add_parser(
+            name, help=summary, description=summary, allow_abbrev=False, epilog=f"examples:\n{_EXAMPLES[name]}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )  # fmt: skip
         add(made)
         made.add_argument("--json", action="store_true", help="print one JSON object on stdout, all else on stderr")
         made.add_argument("--debug", action="store_true", help=argparse.SUPPRESS)
@@ -126,13 +138,4 @@ def _number(text: str, option: str, least: float) -> float:
     return value
 
 
-COMMAND = Command(
-    "instruments",
-    "  glisson instruments add grasper --length-mm 330 --library instruments.toml\n"
-    "  glisson instruments check --library instruments.toml\n"
-    "  glisson instruments recognise view.png --trocar trocar.toml --library instruments.toml --layout layout.toml\n"
-    "  glisson instruments timeline trocar.mp4 --trocar trocar.toml --every 5 --out timeline --json",
-    _add_arguments,
-    _run,
-    _KEYS,
-)
+COMMAND = Command("instruments", "\n".join(_EXAMPLES.values()), _add_arguments, _run, _KEYS)

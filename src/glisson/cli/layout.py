@@ -17,7 +17,10 @@ from glisson.framework.layouts import design_for_room, survey_room
 from glisson.intraoperative.trocar.layout_design import DesignParameters
 from glisson.intraoperative.trocar.survey import Distance
 
-_KEYS = ("layout", "crosses", "tip_mm", "three_or_more", "size_factor", "residual_px", "views", "sigma_mm", "seconds")
+_KEYS = (
+    "layout", "crosses", "tip_mm", "three_or_more", "size_factor", "residual_px", "views", "sigma_mm", "notes",
+    "seconds",
+)  # fmt: skip
 
 
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -93,6 +96,7 @@ def _survey(arguments: argparse.Namespace) -> Answer:
         f"{survey.residual_px:.3f} px off",
         f"size      {survey.size_factor:.4f} ± {survey.size_sigma:.4f} times that of the layout",
         f"places    standard deviation median {np.median(sigmas):.2f} mm, worst {max(sigmas):.2f} mm",
+        *(f"look at   {note}" for note in survey.notes),
         f"written   {arguments.out}",
     ]
     values = {
@@ -102,6 +106,7 @@ def _survey(arguments: argparse.Namespace) -> Answer:
         "residual_px": survey.residual_px,
         "views": survey.views,
         "sigma_mm": {"median": float(np.median(sigmas)), "worst": max(sigmas)},
+        "notes": list(survey.notes),
     }
     return Answer(values, "\n".join(text))
 

@@ -16,7 +16,7 @@ from glisson.framework.localising import GLOBAL, localise_trocar
 
 _KEYS = (
     "status", "message", "position_mm", "rotation", "covariance", "position_bound_mm", "angle_bound_deg", "second",
-    "crosses", "corners", "noise_px", "picture", "seconds",
+    "crosses", "corners", "noise_px", "notes", "picture", "seconds",
 )  # fmt: skip
 
 
@@ -33,9 +33,12 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
     started = time.perf_counter()
+    lines.begun("localize", "it was asked for")
     done = localise_trocar(arguments.image, arguments.camera, arguments.layout, arguments.technique, out=arguments.out)
     found = done.found
-    values = _values(found) | {"picture": str(done.picture), "seconds": time.perf_counter() - started}
+    seconds = time.perf_counter() - started
+    lines.ended("localize", seconds)
+    values = _values(found) | {"picture": str(done.picture), "seconds": seconds}
     exit_code = 0 if found.status.is_good else 2 if found.status is Status.BAD_INPUT else 1
     return Answer(values, "\n".join([*_lines(found), f"picture   {done.picture}"]), exit_code, exit_code != 0)
 
@@ -51,6 +54,7 @@ def _values(found: Localisation) -> dict[str, Any]:
         "crosses": list(found.crosses),
         "corners": 0 if found.corners_px is None else len(found.corners_px),
         "noise_px": found.noise_px,
+        "notes": list(found.notes),
     }
 
 
@@ -83,7 +87,7 @@ def _lines(found: Localisation) -> list[str]:
     if found.second is not None:
         x, y, z = found.second.translation_mm
         lines.append(f"second    {x:.1f}, {y:.1f}, {z:.1f} mm explains the image as well")
-    return lines
+    return lines + [f"look at   {note}" for note in found.notes]
 
 
 COMMAND = Command(

@@ -82,6 +82,7 @@ def _answer(words: Sequence[str], stdout: TextIO) -> Answer:
     debug = "--debug" in words or bool(os.environ.get("GLISSON_DEBUG"))
     command: Command | None = None
     lines = StageLines()
+    keeps = False
     try:
         command = _command(next((word for word in words if not word.startswith("-")), ""))
         if not debug:
@@ -89,6 +90,7 @@ def _answer(words: Sequence[str], stdout: TextIO) -> Answer:
         with redirect_stdout(stdout):
             arguments = _parser(command).parse_args(words)
         assert command is not None  # the parser asks for one
+        keeps = hasattr(arguments, "case")
         answer = command.run(arguments, lines)
         answer.line()  # a number that cannot be printed is a failure like any other
         return answer
@@ -98,20 +100,23 @@ def _answer(words: Sequence[str], stdout: TextIO) -> Answer:
         lines.close()
         if debug:
             traceback.print_exc()
-        return _failure(error, lines.stage, command)
+        return _failure(error, lines.stage, command, keeps)
 
 
-def _failure(error: BaseException, stage: str | None, command: Command | None) -> Answer:
+def _failure(error: BaseException, stage: str | None, command: Command | None, keeps: bool) -> Answer:
+    """What is said of an error; `keeps`: the stages before the one that ran are in a case folder."""
     status: Status | None = None
     exit_code = 1
     while isinstance(error, SystemError) and error.__cause__ is not None:
         error = error.__cause__  # Ctrl-C in the midst of a compiled function comes wrapped, once for each caller
     message = str(error)
     if isinstance(error, KeyboardInterrupt):
-        where = "" if stage is None else f" in the stage {stage}; what was done before it is kept"
+        where = "" if stage is None else f" in the stage {stage}"
+        where += "; what was done before it is kept" if stage is not None and keeps else ""
         message, exit_code = message or f"Interrupted{where}.", _INTERRUPTED
     elif isinstance(error, StageFailed):
         status = error.status
+        exit_code = 2 if status is Status.BAD_INPUT else 1
     elif isinstance(error, GlissonError):
         exit_code = error.exit_code
         status = Status.BAD_INPUT if isinstance(error, BadInput) else None

@@ -10,10 +10,12 @@ from glisson.cli.console import Answer
 from glisson.cli.options import point_from_text
 from glisson.cli.progress import StageLines
 from glisson.core.errors import BadInput
+from glisson.core.status import Status
 from glisson.framework.pointing import Pointed, Resection, Span, point_and_draw
 from glisson.intraoperative.pointer.measuring import Length
+from glisson.intraoperative.pointer.resection import DrawnPlane
 
-_KEYS = ("frame", "points", "distances", "strokes", "plane", "files")
+_KEYS = ("status", "message", "frame", "points", "distances", "strokes", "plane", "files")
 
 
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -42,7 +44,11 @@ def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
     done = point_and_draw(
         arguments.tips, arguments.instrument, arguments.point, arguments.stroke, _resection(arguments), arguments.out
     )
-    return Answer(_values(done), _text(done))
+    status, message = Status.CONVERGED, Status.CONVERGED.sentence
+    if done.plane is not None and not done.plane.status.is_good:
+        status, message = done.plane.status, _open_tilt(done.plane)
+    values = {"status": status, "message": message} | _values(done)
+    return Answer(values, _text(done), 0 if status.is_good else 1)
 
 
 def _resection(arguments: argparse.Namespace) -> Resection | None:
@@ -71,7 +77,7 @@ def _values(done: Pointed) -> dict[str, Any]:
         "distances": [{"from": a, "to": b, **_length(found)} for (a, b), found in done.distances.items()],
         "strokes": {name: _length(found) for name, found in done.strokes.items()},
         "plane": None
-        if plane is None
+        if plane is None or not plane.status.is_good
         else {
             "point_mm": plane.plane.point_mm.tolist(),
             "normal": plane.plane.normal.tolist(),
@@ -96,14 +102,23 @@ def _text(done: Pointed) -> str:
         lines.append(f"point     {name}: ({x:.2f}, {y:.2f}, {z:.2f}) ± {sigma:.2f} mm in the frame {done.frame}")
     lines += [f"distance  {a} to {b}: {one.mm:.2f} ± {one.sigma_mm:.2f} mm" for (a, b), one in done.distances.items()]
     lines += [f"stroke    {name}: {one.mm:.1f} ± {one.sigma_mm:.1f} mm long" for name, one in done.strokes.items()]
-    if done.plane is not None:
-        plane = done.plane
+    plane = done.plane
+    if plane is not None and not plane.status.is_good:
+        lines.append(f"plane     {plane.status}: {_open_tilt(plane)}")
+    elif plane is not None:
         x, y, z = plane.plane.normal
         lines.append(
             f"plane     normal ({x:.4f}, {y:.4f}, {z:.4f}) ± {np.degrees(plane.tilt_sigma_rad):.2f}°, the line "
             f"{plane.rms_mm:.2f} mm off it"
         )
     return "\n".join(lines + [f"written   {file}" for file in done.files])
+
+
+def _open_tilt(plane: DrawnPlane) -> str:
+    return (
+        f"The line that was drawn is nearly straight and leaves the plane's tilt open "
+        f"(± {np.degrees(plane.tilt_sigma_rad):.0f}°); draw it on round a curve of the organ."
+    )
 
 
 def _span(text: str) -> Span:

@@ -82,7 +82,8 @@ def _told(made: Reconstructed, technique: str) -> tuple[dict[str, object], list[
         text.append(
             f"landmark    {mark['name']} at {x:.2f}, {y:.2f}, {z:.2f} mm, error bar {mark['sigma_mm'][0]:.2f} mm"
         )
-    text.append(f"surface     {points} points of {made.views.features.count} features and the touched point")
+    counted = "1 point" if points == 1 else f"{points} points"
+    text.append(f"surface     {counted} of {made.views.features.count} features and the touched point")
     text += [f"look at     {note}" for note in made.found.notes]
     return values, [*text, f"written     {made.observations}", f"picture     {made.picture}"]
 

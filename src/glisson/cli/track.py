@@ -22,7 +22,8 @@ from glisson.io.camera_files import read_camera
 from glisson.io.track_files import write_tracks
 from glisson.studies.page import png
 
-TRACKS, PICTURE = "tracks.csv", "tracks.png"
+TRACKS, PICTURE = ".tracks.csv", ".tracks.png"
+"""What follows the name of the video in those of its files."""
 
 _KEYS = (
     "status", "message", "frames", "seconds_of_video", "markers", "unit", "frames_per_s", "following_per_s", "notes",
@@ -69,7 +70,8 @@ def followed(video: str, arguments: argparse.Namespace, lines: StageLines) -> Tr
     count = None if arguments.count is None else max(round(positive_from_text(arguments.count, "--count")), 1)
     places = np.array(arguments.at) if arguments.at else None
     progress = lines.begun("track", f"{video} is a video")
-    tracked = track_video(video, places, arguments.find, count, arguments.technique, progress)
+    camera = None if arguments.camera is None else read_camera(arguments.camera)
+    tracked = track_video(video, places, arguments.find, count, arguments.technique, camera, progress)
     lines.ended("track", len(tracked.tracks.times_s) / tracked.frames_per_s)
     return tracked
 
@@ -84,16 +86,18 @@ def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
     in_unit = unit_of(arguments)
     tracked = followed(arguments.video, arguments, lines)
     tracks = in_unit(tracked.tracks)
-    out = Path(arguments.out) if arguments.out else Path(arguments.video).parent
-    write_tracks(out / TRACKS, tracks)
-    with atomic_path(out / PICTURE) as temporary:
+    video = Path(arguments.video)
+    out = Path(arguments.out) if arguments.out else video.parent
+    file, picture = out / f"{video.stem}{TRACKS}", out / f"{video.stem}{PICTURE}"
+    write_tracks(file, tracks)
+    with atomic_path(picture) as temporary:
         temporary.write_bytes(png(draw_tracks(tracked.tracks, tracked.first)))
     markers = _markers(tracked)
     values: dict[str, Any] = {
         "status": Status.CONVERGED, "message": Status.CONVERGED.sentence, "frames": len(tracks.times_s),
         "seconds_of_video": float(tracks.times_s[-1]), "markers": markers, "unit": tracks.unit,
         "frames_per_s": tracked.frames_per_s, "following_per_s": tracked.following_per_s,
-        "notes": list(tracked.notes), "file": str(out / TRACKS), "picture": str(out / PICTURE),
+        "notes": list(tracked.notes), "file": str(file), "picture": str(picture),
         "seconds": len(tracks.times_s) / tracked.frames_per_s,
     }  # fmt: skip
     whole = sum(marker["seen"] == 1.0 for marker in markers)
@@ -101,7 +105,7 @@ def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
         f"markers   {len(markers)}, {whole} of them seen in all of {len(tracks.times_s)} frames",
         f"speed     {tracked.frames_per_s:.0f} frames per second; {tracked.following_per_s:.0f} without decoding",
         *(f"look at   {note}" for note in tracked.notes),
-        f"written   {out / TRACKS} and {out / PICTURE}",
+        f"written   {file} and {picture}",
     ]
     return Answer(values, "\n".join(text))
 

@@ -11,6 +11,9 @@ from glisson.core.errors import BadInput
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+_ROUNDED = 1e-3
+"""Covariances may be rounded to three digits, of the standard deviations of what they are between."""
+
 
 def frozen_floats(value: ArrayLike, shape: Sequence[int | None], what: str) -> FloatArray:
     """Copy `value` into a read-only float64 array of the given shape (None: any length).
@@ -58,15 +61,32 @@ def unit_vector(value: ArrayLike, what: str) -> FloatArray:
     return unit
 
 
-def frozen_covariance(value: ArrayLike, shape: Sequence[int | None], what: str) -> FloatArray:
-    """Like `frozen_floats` for covariances (..., k, k), which must be positive definite.
+def frozen_covariance(
+    value: ArrayLike, shape: Sequence[int | None], what: str, *, singular: bool = False
+) -> FloatArray:
+    """Like `frozen_floats` for covariances (..., k, k), which must be symmetric and positive definite.
+
+    With `singular` they need be semi-definite only, as where something is known exactly.
 
     Raises:
-        BadInput: the shape differs, or one of them is not positive definite.
+        BadInput: the shape differs, or one of them is no covariance beyond rounding.
     """
     array = frozen_floats(value, shape, what)
-    if array.size and not (np.linalg.eigvalsh(array) > 0.0).all():
-        raise BadInput(f"{what[0].upper()}{what[1:]} must be positive definite.")
+    if not array.size:
+        return array
+    begun = f"{what[0].upper()}{what[1:]} must be"
+    variances = np.diagonal(array, axis1=-2, axis2=-1)
+    if (variances < 0.0).any():
+        raise BadInput(f"{begun} a covariance, but has a negative variance.")
+    largest = np.sqrt(variances[..., :, None] * variances[..., None, :])
+    if (np.abs(array - np.swapaxes(array, -1, -2)) > _ROUNDED * largest).any():
+        raise BadInput(f"{begun} symmetric.")
+    if not singular and not (np.linalg.eigvalsh(array) > 0.0).all():
+        raise BadInput(f"{begun} positive definite.")
+    # Of the correlations, so that units (rad beside mm) do not matter.
+    correlations = array / np.where(largest > 0.0, largest, 1.0)
+    if (np.abs(array) > (1.0 + _ROUNDED) * largest).any() or (np.linalg.eigvalsh(correlations) < -_ROUNDED).any():
+        raise BadInput(f"{begun} positive semi-definite.")
     return array
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from glisson.core.arrays import FloatArray, frozen_floats
+from glisson.core.arrays import FloatArray, frozen_covariance, frozen_floats
 from glisson.core.errors import BadInput
 
 
@@ -39,7 +39,8 @@ class Camera:
         if (self.focal_px <= 0.0).any():
             raise BadInput("A camera's focal lengths must be positive.")
         if self.covariance is not None:
-            object.__setattr__(self, "covariance", frozen_floats(self.covariance, (9, 9), "camera covariance"))
+            covariance = frozen_covariance(self.covariance, (9, 9), "the camera's covariance", singular=True)
+            object.__setattr__(self, "covariance", covariance)
 
     @property
     def matrix(self) -> FloatArray:

@@ -22,6 +22,7 @@ class Localisation:
         position_bound_mm: the position errs by more than this in one of 10,000 cases.
         angle_bound_rad: the same of its orientation.
         noise_px: standard deviation of a corner, as the residual has it.
+        notes: sentences on what a person should look at.
     """
 
     status: Status
@@ -33,3 +34,4 @@ class Localisation:
     position_bound_mm: float | None = None
     angle_bound_rad: float | None = None
     noise_px: float | None = None
+    notes: tuple[str, ...] = ()

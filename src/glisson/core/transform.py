@@ -4,9 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
-from glisson.core.arrays import FloatArray, frozen_floats
+from glisson.core.arrays import FloatArray, frozen_covariance, frozen_floats
 from glisson.core.errors import BadInput
 
 FRAMES = ("camera", "trocar", "room", "patient")
@@ -34,7 +33,8 @@ class RigidTransform:
         object.__setattr__(self, "rotation", rotation)
         object.__setattr__(self, "translation_mm", frozen_floats(self.translation_mm, (3,), "translation"))
         if self.covariance is not None:
-            object.__setattr__(self, "covariance", frozen_floats(self.covariance, (6, 6), "pose covariance"))
+            covariance = frozen_covariance(self.covariance, (6, 6), "the pose's covariance", singular=True)
+            object.__setattr__(self, "covariance", covariance)
 
     def apply(self, points_mm: ArrayLike) -> FloatArray:
         """Points (n, 3) or (3,) of the source frame, in the target frame."""
@@ -43,6 +43,8 @@ class RigidTransform:
 
     def moved(self, step: FloatArray) -> "RigidTransform":
         """The transform after a step (6,) of d and e; without covariance."""
+        from scipy.spatial.transform import Rotation  # slow to load, and `--help` needs this module
+
         turn = Rotation.from_rotvec(step[:3]).as_matrix()
         return RigidTransform(self.target, self.source, turn @ self.rotation, self.translation_mm + step[3:])
 

@@ -13,6 +13,7 @@ from glisson.intraoperative.instruments.codes import alike_codes, free_code
 from glisson.io.instrument_files import EXAMPLE_LIBRARY, read_instruments, read_trocar, write_instruments
 from glisson.io.layout_files import read_layout
 from glisson.io.photographs import read_photograph, write_photograph
+from glisson.io.result_places import result_place
 
 BY_WHEEL = "colour-wheel"
 BY_CROSSES = "global"
@@ -90,13 +91,15 @@ def recognise_picture(
         trocar: its `trocar.toml`.
         library: `instruments.toml`; by default the one that comes with Glisson.
         layout: `layout.toml` of the crosses in the room, which the same picture shows; None: no place in the room.
-        out: the picture of what was seen; by default beside the image, named `…-instrument.png`.
+        out: the picture of what was seen, `.png`; by default beside the image, named `…-instrument.png`.
 
     Raises:
-        BadInput: a file cannot be used, or they do not belong together.
+        BadInput: a file cannot be used or would be overwritten, or they do not belong together.
         StageFailed: see `glisson.core.protocols.InstrumentRecogniser`.
         WriteFailed: the disk is full.
     """
+    beside = Path(image).with_name(f"{Path(image).stem}-instrument.png")
+    picture = result_place(beside if out is None else out, (image, trocar, library, layout), ".png")
     taken, through, known = read_photograph(image), read_trocar(trocar), checked_library(library)
     recogniser: InstrumentRecogniser = make_technique("instrument-recogniser", BY_WHEEL, {}, "--technique")
     seen = recogniser.recognise(taken, through, known)
@@ -104,6 +107,5 @@ def recognise_picture(
     if layout is not None:
         localiser: Localiser = make_technique("localiser", BY_CROSSES, {}, "--technique")
         place = localiser.localise(taken, through.camera, read_layout(layout))
-    picture = Path(out) if out is not None else Path(image).with_name(f"{Path(image).stem}-instrument.png")
     write_photograph(picture, draw_instrument(taken, through, seen))
     return Recognised(seen, place, picture)

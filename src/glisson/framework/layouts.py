@@ -11,6 +11,7 @@ from glisson.io.camera_files import read_camera
 from glisson.io.layout_files import read_layout, write_layout
 from glisson.io.photographs import read_photograph
 from glisson.io.recommended import or_recommended_camera, or_recommended_room
+from glisson.io.result_places import result_place
 
 
 def design_for_room(
@@ -24,11 +25,12 @@ def design_for_room(
     """Design a layout and write it; room and camera are those that come with Glisson where they are not given.
 
     Raises:
-        BadInput: a file cannot be used, or the room has too few places.
+        BadInput: a file cannot be used or would be overwritten, or the room has too few places.
         WriteFailed: the disk is full.
     """
+    place = result_place(out, (room, camera))
     design = design_layout(or_recommended_room(room), or_recommended_camera(camera), parameters, seed, progress)
-    write_layout(out, design.layout)
+    write_layout(place, design.layout)
     return design
 
 
@@ -38,10 +40,11 @@ def survey_room(
     """Survey the crosses of a layout from pictures, and write where they hang.
 
     Raises:
-        BadInput: a file cannot be used, or a picture has another size than the camera's.
+        BadInput: a file cannot be used or would be overwritten, or a picture has another size than the camera's.
         StageFailed: a cross is not seen often enough.
         WriteFailed: the disk is full.
     """
+    place = result_place(out, (layout, camera, *images))
     taken_by = read_camera(camera)
     taken = []
     for path in images:
@@ -50,5 +53,5 @@ def survey_room(
             raise BadInput(f"{path} is not of the camera's {taken_by.width} × {taken_by.height} px.")
         taken.append(picture)
     survey = survey_layout(taken, taken_by, read_layout(layout), distance)
-    write_layout(out, survey.layout)
+    write_layout(place, survey.layout)
     return survey

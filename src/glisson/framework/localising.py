@@ -12,6 +12,7 @@ from glisson.framework.cross_figure import draw_localisation
 from glisson.io.camera_files import read_camera
 from glisson.io.layout_files import read_layout
 from glisson.io.photographs import read_photograph, write_photograph
+from glisson.io.result_places import result_place
 
 GLOBAL = "global"
 
@@ -40,15 +41,16 @@ def localise_trocar(
         layout: the crosses' `layout.toml`.
         technique: of the kind localiser.
         parameters: of the technique.
-        out: the picture of what was seen; by default beside the image, named `…-crosses.png`.
+        out: the picture of what was seen, `.png`; by default beside the image, named `…-crosses.png`.
 
     Raises:
-        BadInput: a file cannot be used, or they do not belong together.
+        BadInput: a file cannot be used or would be overwritten, or they do not belong together.
         WriteFailed: the disk is full.
     """
+    beside = Path(image).with_name(f"{Path(image).stem}-crosses.png")
+    place = result_place(beside if out is None else out, (image, camera, layout), ".png")
     maker: Localiser = make_technique("localiser", technique, parameters or {}, "--technique")
     taken, seen_by, crosses = read_photograph(image), read_camera(camera), read_layout(layout)
     found = maker.localise(taken, seen_by, crosses)
-    place = Path(out) if out is not None else Path(image).with_name(f"{Path(image).stem}-crosses.png")
     write_photograph(place, draw_localisation(taken, seen_by, crosses, found))
     return Localised(found, place)

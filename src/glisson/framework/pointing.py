@@ -80,7 +80,8 @@ def point_and_draw(
         out: the folder.
 
     Raises:
-        BadInput: a file cannot be used, the tip was not seen in a span, or a stroke spans no plane.
+        BadInput: a file cannot be used, the tip was not seen in a span, a stroke is one straight line, or the
+            direction to the removed side does not tell it.
         WriteFailed: the disk is full.
     """
     track = _track(tips, instrument)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from glisson.intraoperative.views.features import match_features
 from glisson.intraoperative.views.tip import find_tip
 from glisson.io.observation_files import write_observations
 from glisson.io.photographs import read_photograph
+from glisson.io.result_places import result_place
 from glisson.io.view_session_files import SessionView, ViewSession, read_view_session
 
 JOINT = "bundle"
@@ -46,21 +48,24 @@ def reconstruct_session(
     """Reconstruct a session, and write the observations and a picture of what was seen into a folder.
 
     Raises:
-        BadInput: the session or a picture cannot be used.
+        BadInput: the session or a picture cannot be used or would be overwritten.
         StageFailed: a tip was not found, or the views are too close to each other; the picture is there all the same.
         WriteFailed: the disk is full.
     """
     maker: SurfaceReconstructor = make_technique("surface-reconstructor", technique, parameters or {}, "--technique")
     given = read_view_session(session)
+    folder = Path(out)
+    read = (session, *(view.image for view in given.views))
+    picture, file = (result_place(folder / name, read) for name in (PICTURE, OBSERVATIONS))
     progress(0.0, "reading the pictures")
     images = tuple(_image(view) for view in given.views)
+    _check_different(given, images)
     views, found_tips = _view_set(given, images, progress)
-    folder = Path(out)
-    draw_views(views, images, folder / PICTURE)
+    draw_views(views, images, picture)
     progress(0.6, "reconstructing")
     found = maker.reconstruct(views, progress)
-    write_observations(folder / OBSERVATIONS, found.observations)
-    return Reconstructed(found, views, found_tips, folder / OBSERVATIONS, folder / PICTURE)
+    write_observations(file, found.observations)
+    return Reconstructed(found, views, found_tips, file, picture)
 
 
 def _image(view: SessionView) -> NDArray[np.uint8] | None:
@@ -73,6 +78,12 @@ def _image(view: SessionView) -> NDArray[np.uint8] | None:
             f"{view.camera.width} × {view.camera.height}; give the picture as the camera took it."
         )
     return image
+
+
+def _check_different(session: ViewSession, images: Images) -> None:
+    for (one, first), (other, second) in combinations(zip(session.views, images, strict=True), 2):
+        if first is not None and second is not None and np.array_equal(first, second):
+            raise BadInput(f"{one.name} and {other.name} have the same picture; give each view its own.")
 
 
 def _view_set(session: ViewSession, images: Images, progress: Progress) -> tuple[ViewSet, tuple[str, ...]]:

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glisson.core.arrays import FloatArray
-from glisson.core.errors import StageFailed
+from glisson.core.camera import Camera
+from glisson.core.errors import BadInput, StageFailed
 from glisson.core.protocols import MarkerTracker, Progress, silent
 from glisson.core.registry import make_technique
 from glisson.core.status import Status
@@ -44,16 +45,24 @@ def track_video(
     find: str = "spots",
     count: int | None = None,
     technique: str = TECHNIQUE,
+    camera: Camera | None = None,
     progress: Progress = silent,
 ) -> TrackedVideo:
     """Follow markers: those given (m, 2) px in the first frame, or `count` that are found there (None: up to 20).
 
+    `camera` is what took the video, if that is known.
+
     Raises:
-        BadInput: the video cannot be read, or a marker lies outside.
+        BadInput: the video cannot be read or is not of the camera's size, or a marker lies outside.
         StageFailed: too few markers are found, or the video has fewer than two frames.
     """
     tracker: MarkerTracker = make_technique("marker-tracker", technique, {}, "--technique")
     with open_video(path, progress) as video:
+        if camera is not None and (video.width, video.height) != (camera.width, camera.height):
+            raise BadInput(
+                f"{path} has {video.width} × {video.height} px, its camera was calibrated at {camera.width} × "
+                f"{camera.height} px; give the camera that took it."
+            )
         frames = iter(video)
         first = next(frames, None)
         if first is None:

@@ -45,7 +45,8 @@ def read_view_session(path: str | Path) -> ViewSession:
     """A session; files that it names lie beside it unless their paths are absolute.
 
     Raises:
-        BadInput: absent, damaged, an unknown key, a number that is not finite, or no rotation, named by its key path.
+        BadInput: absent, damaged, an unknown key, a number that is not finite, no rotation, or a landmark outside the
+            image, named by its key path; or two views of one name.
     """
     file = Path(path)
     with read_record(file, "a session of views", _SCHEMA) as record:
@@ -58,8 +59,12 @@ def read_view_session(path: str | Path) -> ViewSession:
             common = record.record("hand_eye")
             hand_eye = _covariance(common, "covariance", 6, ("sigma_deg", "sigma_mm"))
             common.finish()
+        views = tuple(_view(entry, file.parent, camera, at) for at, entry in enumerate(record.records("views"), 1))
+        names = [view.name for view in views]
+        if doubled := next((name for name in names if names.count(name) > 1), None):
+            raise BadInput(f"Two views have the name {doubled!r}.")
         return ViewSession(
-            views=tuple(_view(entry, file.parent, camera, at) for at, entry in enumerate(record.records("views"), 1)),
+            views=views,
             touched_mm=point,
             touched_covariance_mm2=covariance,
             tip_sigma_px=record.number("tip_sigma_px", 1.5),
@@ -76,7 +81,7 @@ def _view(record: Record, folder: Path, camera: str | None, number: int) -> Sess
     landmarks = record.record("landmarks_px") if record.has("landmarks_px") else Record({})
     names = landmarks.keys()
     with record.building():
-        return SessionView(
+        view = SessionView(
             name=record.text("name", f"view {number}"),
             image=folder / record.text("image") if record.has("image") else None,
             camera=read_camera(folder / own),
@@ -84,10 +89,18 @@ def _view(record: Record, folder: Path, camera: str | None, number: int) -> Sess
             tip_px=record.floats("tip_px", 2) if record.has("tip_px") else None,
             landmarks_px={name: landmarks.floats(name, 2) for name in names},
         )
+    width, height = view.camera.width, view.camera.height
+    clicked = {"tip_px": view.tip_px} if view.tip_px is not None else {}
+    for name, (u, v) in (clicked | view.landmarks_px).items():
+        if not (-0.5 <= u <= width - 0.5 and -0.5 <= v <= height - 0.5):
+            raise BadInput(f"{view.name}: {name!r} at {u:g}, {v:g} px is outside the image of {width} × {height} px.")
+    return view
 
 
 def _pose(record: Record) -> RigidTransform:
     """From `rotation`, or from `direction` alone, which leaves the roll open."""
+    if record.has("rotation") and record.has("direction"):
+        raise BadInput(f"{record.where('rotation')} and {record.where('direction')}: give one of the two.")
     if record.has("rotation"):
         rotation = record.floats("rotation", 3, 3)
         roll = None

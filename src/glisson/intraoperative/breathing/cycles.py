@@ -10,7 +10,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.signal import find_peaks
 
 from glisson.core.arrays import FloatArray
-from glisson.core.errors import StageFailed
+from glisson.core.errors import BadInput, StageFailed
 from glisson.core.status import Status
 from glisson.core.tracks import Tracks
 from glisson.intraoperative.breathing.signal import Signal, breathing_signal
@@ -80,10 +80,16 @@ def find_cycles(tracks: Tracks, exhaled_at_s: float | None = None) -> Cycles:
     Which end is exhalation is told by the tissue's staying there longer, unless a moment of exhalation is given.
 
     Raises:
+        BadInput: the moment of exhalation is not in the recording.
         StageFailed: there are fewer than two whole breaths, or nothing repeats itself.
     """
     signal = breathing_signal(tracks)
     times = np.asarray(tracks.times_s)
+    if exhaled_at_s is not None and not times[0] <= exhaled_at_s <= times[-1]:
+        raise BadInput(
+            f"The moment of exhalation must be in the recording, from {times[0]:g} to {times[-1]:g} s, not "
+            f"{exhaled_at_s:g} s."
+        )
     values, notes = _upright(signal, times, exhaled_at_s)
     period = _period(values, times)
     smooth = gaussian_filter1d(values, _SMOOTH * period * tracks.frames_per_s)

@@ -107,7 +107,7 @@ class BoardView:
         pixels = frozen_floats(self.pixels, (len(points), 2), f"{self.name}: the pixels of {len(points)} board points")
         object.__setattr__(self, "pixels", pixels)
         if len(points) < 6:
-            raise BadInput(f"{self.name}: {len(points)} points of the board are too few; at least 6 are needed.")
+            raise BadInput(f"{self.name}: too few points of the board are seen ({len(points)}); at least 6 are needed.")
         if np.abs(points[:, 2]).max() > 0.0:
             raise BadInput(f"{self.name}: the board is not flat (z must be 0).")
         if np.linalg.matrix_rank(points[:, :2] - points[:, :2].mean(axis=0), tol=1e-6) < 2:

@@ -16,7 +16,7 @@ from glisson.intraoperative.cameras.adjustment import inverse
 from glisson.intraoperative.cameras.board_bundle import INTRINSIC, Bundle, Seen, adjusted_bundle
 from glisson.intraoperative.cameras.board_pose import board_poses
 from glisson.intraoperative.cameras.boards import BoardView
-from glisson.intraoperative.cameras.calibration_checks import FOCAL_SHARE, notes_on_views, unobservable
+from glisson.intraoperative.cameras.calibration_checks import FOCAL_SHARE, check_repeated, notes_on_views, unobservable
 
 DISTORTIONS: tuple[tuple[int, ...], ...] = ((), (0,), (0, 1), (0, 1, 2, 3), (0, 1, 2, 3, 4))
 """Sets of distortion terms that are tried, as indices of `NAMES`, each within the next."""
@@ -74,12 +74,13 @@ def calibrate_camera(views: Sequence[BoardView], width: int, height: int) -> Cam
         height: of the images, px.
 
     Raises:
-        BadInput: fewer than three views, or a point outside the image.
+        BadInput: fewer than three views, a point outside the image, or a view that repeats another one.
         StageFailed: unobservable, or a view that does not fit, with a sentence on what to change.
     """
     if len(views) < 3:
-        raise BadInput(f"{len(views)} views of the board are too few to calibrate a camera; take 10 or more, tilted.")
+        raise BadInput(f"These are too few views to calibrate a camera ({len(views)}); take 10 or more, tilted.")
     _check_inside(views, width, height)
+    check_repeated(views)
     seen = [Seen(view.points_mm, view.pixels, np.ones(len(view.pixels))) for view in views]
     best = _best_bundle(_start(seen, width, height), seen)
     used = _within(best.state.residuals(seen))

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from glisson.core.arrays import FloatArray
 from glisson.core.camera import Camera
-from glisson.core.errors import StageFailed
+from glisson.core.errors import BadInput, StageFailed
 from glisson.core.status import Status
 from glisson.core.transform import RigidTransform
 from glisson.intraoperative.cameras.boards import BoardView
@@ -20,6 +20,30 @@ _FOCAL_NOTE = 0.005
 _TILT_DEG = 10.0
 _COVERED = 0.5
 _PATIENCE = 2.5
+_REPEATED_PX = 1.0
+
+
+def check_repeated(views: Sequence[BoardView]) -> None:
+    """Refuse views that say the same twice, since all are counted as independent.
+
+    Raises:
+        BadInput: two views show the board in the same place of the image.
+    """
+    seen = [{tuple(point): pixel for point, pixel in zip(view.points_mm.tolist(), view.pixels, strict=True)}
+            for view in views]  # fmt: skip
+    repeated = []
+    for number, later in enumerate(seen):
+        for earlier, name in zip(seen[:number], (view.name for view in views), strict=False):
+            off = [later[point] - earlier[point] for point in later.keys() & earlier.keys()]
+            if 2 * len(off) > len(later) and float(np.sqrt(np.mean(np.square(off)))) < _REPEATED_PX:
+                repeated.append(f"{views[number].name} (as {name})")
+                break
+    if repeated:
+        named = ", ".join(repeated[:8]) + (" …" if len(repeated) > 8 else "")
+        raise BadInput(
+            f"The board is in the same place of the image again in {named}: such a view tells nothing "
+            "new; leave it out, and move the board or the camera for each view."
+        )
 
 
 def unobservable(poses: Sequence[RigidTransform], share: float) -> StageFailed:

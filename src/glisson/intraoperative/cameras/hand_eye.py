@@ -8,10 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from glisson.core.arrays import FloatArray
 from glisson.core.camera import Camera
-from glisson.core.errors import BadInput, StageFailed
-from glisson.core.status import Status
 from glisson.core.transform import RigidTransform
 from glisson.intraoperative.cameras.board_pose import BoardPose, board_pose
+from glisson.intraoperative.cameras.hand_eye_checks import check_fit, check_views
 from glisson.intraoperative.cameras.hand_eye_closed_form import hand_eye_closed_form
 from glisson.intraoperative.cameras.hand_eye_equations import (
     HandEyeView,
@@ -23,7 +22,6 @@ from glisson.intraoperative.cameras.hand_eye_equations import (
 from glisson.intraoperative.cameras.projection import project
 from glisson.intraoperative.cameras.turning import turning
 
-_TURNED_DEG = 3.0
 _PATIENCE = 5.0
 _STARTS = ((1e-3, 0.1, 1.0), (1e-5, 1e-3, 10.0), (1e-4, 0.05, 3.0))
 """Errors of a tracker in rad and mm, and of a board in standard deviations of a pixel, to begin with."""
@@ -79,9 +77,10 @@ def calibrate_hand_eye(camera: Camera, views: Sequence[HandEyeView]) -> HandEye:
 
     Raises:
         BadInput: fewer than three views, or a second marker in some only.
-        StageFailed: unobservable (poses nearly parallel), or a board whose pose is ambiguous.
+        StageFailed: unobservable (poses nearly parallel), a board whose pose is ambiguous, or poses that do not belong
+            to the images.
     """
-    _check(views)
+    check_views(views)
     boards = [board_pose(camera, view.board) for view in views]
     poses = hand_eye_closed_form([board.camera_from_board for board in boards], [tracked(view) for view in views])
     sigma_px = _pixel_sigma(boards)
@@ -99,22 +98,8 @@ def calibrate_hand_eye(camera: Camera, views: Sequence[HandEyeView]) -> HandEye:
         corrected = replace(corrected, covariance=steps @ covariance[12:, 12:] @ steps.T)
     poses = replace(poses[0], covariance=covariance[:6, :6]), replace(poses[1], covariance=covariance[6:12, 6:12])
     sigmas = sigma_px, float(sizes[2]), float(np.degrees(sizes[0])), float(sizes[1])
+    check_fit(views, boards, camera.width, sigmas[1:])
     return _told(corrected, views, poses, sigmas)
-
-
-def _check(views: Sequence[HandEyeView]) -> None:
-    if len(views) < 3:
-        raise BadInput(f"{len(views)} views are too few for a hand–eye calibration; take 10 or more.")
-    if len({view.room_from_base is None for view in views}) > 1:
-        raise BadInput("The board's marker was tracked in some views only; give its poses for all of them or for none.")
-    turned = turning([tracked(view).rotation.T for view in views])
-    if turned.about_second_deg < _TURNED_DEG:
-        raise StageFailed(
-            "The poses are nearly parallel: turn the scope about another axis "
-            f"(it was turned by {turned.about_first_deg:.1f}° about one and {turned.about_second_deg:.1f}° about the "
-            "next).",
-            Status.UNOBSERVABLE,
-        )
 
 
 def _pixel_sigma(boards: Sequence[BoardPose]) -> float:

@@ -62,7 +62,7 @@ def calibrate_pivot(room_from_marker: Sequence[RigidTransform]) -> Pivot:
         StageFailed: unobservable (hardly turned, or about one axis only), or no point fits most of the poses.
     """
     if len(room_from_marker) < 5:
-        raise BadInput(f"{len(room_from_marker)} poses are too few for a pivot calibration; take 20 or more.")
+        raise BadInput(f"These are too few poses for a pivot calibration ({len(room_from_marker)}); take 20 or more.")
     rotations = np.stack([pose.rotation for pose in room_from_marker])
     shifts = np.stack([pose.translation_mm for pose in room_from_marker])
     turned = turning(list(rotations))
@@ -125,7 +125,7 @@ def _notes(used: NDArray[np.bool_], covariance: FloatArray, rms_mm: float) -> tu
     left_out = np.flatnonzero(~used)
     if len(left_out):
         numbers = ", ".join(str(number + 1) for number in left_out[:8]) + (" …" if len(left_out) > 8 else "")
-        notes.append(f"{len(left_out)} of {len(used)} poses were left out as outliers: {numbers}.")
+        notes.append(f"{len(left_out)} of {len(used)} poses were left out as outliers, counted from 1: {numbers}.")
     sigma = float(np.sqrt(np.linalg.eigvalsh(covariance[:3, :3])[-1]))
     if sigma > 1.0:
         notes.append(f"The tip is known to {sigma:.1f} mm only (one standard deviation): swing the tool further.")

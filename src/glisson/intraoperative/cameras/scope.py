@@ -12,6 +12,8 @@ from glisson.core.transform import RigidTransform, cross_matrix
 from glisson.intraoperative.cameras.turning import turning
 
 _TURNED_DEG = 20.0
+_BEHIND_MM, _BEFORE_MM, _ASIDE_MM, _SIGMAS = 2.0, 30.0, 20.0, 3.0
+"""No scope's glass tip is farther from its centre of projection than this, and so many standard deviations."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +45,7 @@ def calibrate_shaft(room_from_marker: Sequence[RigidTransform]) -> Shaft:
     """
     if len(room_from_marker) < 5:
         raise BadInput(
-            f"{len(room_from_marker)} poses are too few to find the shaft; spin the scope through 20 or more."
+            f"These are too few poses to find the shaft ({len(room_from_marker)}); spin the scope through 20 or more."
         )
     rotations = np.stack([pose.rotation for pose in room_from_marker])
     turned = turning(list(rotations))
@@ -113,9 +115,13 @@ def scope_geometry(
         tip_mm: the glass tip in the marker's frame (3,), by `calibrate_pivot` or as known.
         tip_covariance_mm2: (3, 3).
         shaft: the shaft in the marker's frame, if it was measured.
+
+    Raises:
+        BadInput: the tip lies where no scope has it.
     """
     tip = camera_from_marker.apply(tip_mm)
     covariance = camera_from_marker.point_covariance(tip_mm, tip_covariance_mm2)
+    _check_tip(tip, covariance)
     if shaft is None:
         return Scope(tip, covariance, None, None, None, None)
     along = shaft.direction * np.sign(float((tip_mm - shaft.point_mm) @ shaft.direction) or 1.0)
@@ -136,3 +142,14 @@ def scope_geometry(
         float(np.degrees(np.sqrt(towards @ spread @ towards))),
         float(np.linalg.norm(off)),
     )  # fmt: skip
+
+
+def _check_tip(tip_mm: FloatArray, covariance_mm2: FloatArray) -> None:
+    depth, aside = float(tip_mm[2]), float(np.linalg.norm(tip_mm[:2]))
+    slack = _SIGMAS * float(np.sqrt(np.linalg.eigvalsh(covariance_mm2)[-1]))
+    if -_BEHIND_MM - slack <= depth <= _BEFORE_MM + slack and aside <= _ASIDE_MM + slack:
+        return
+    raise BadInput(
+        f"The glass tip would lie {abs(depth):.0f} mm {'before' if depth > 0.0 else 'behind'} the centre of projection "
+        f"and {aside:.0f} mm beside the optical axis: are the tip and the hand–eye pose of the same marker, in mm?"
+    )

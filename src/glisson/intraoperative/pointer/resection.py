@@ -7,11 +7,16 @@ import numpy as np
 from glisson.core.arrays import FloatArray, unit_vector
 from glisson.core.errors import BadInput
 from glisson.core.mesh import TriangleSurface
+from glisson.core.status import Status
 from glisson.core.structures import Plane
 from glisson.core.tip_track import TipTrack
 from glisson.geometry.planes import fit_plane, plane_basis
 
 _ROUNDS = 20
+_TILT_DEG = 10.0
+"""A plane whose tilt is known to no better (one standard deviation) is none."""
+_ACROSS_DEG, _SIGMAS = 5.0, 3.0
+"""A direction nearer to the plane than this, or than so many standard deviations of its tilt, tells no side."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +40,11 @@ class DrawnPlane:
         """Standard deviation of the tilt about the axis that is known least."""
         return float(np.sqrt(np.linalg.eigvalsh(self.covariance[:2, :2])[-1]))
 
+    @property
+    def status(self) -> Status:
+        """Unobservable where the line, nearly straight, leaves the tilt open."""
+        return Status.CONVERGED if self.tilt_sigma_rad < np.radians(_TILT_DEG) else Status.UNOBSERVABLE
+
 
 def plane_of(track: TipTrack, towards: FloatArray) -> DrawnPlane:
     """The most likely plane through a line drawn on the organ, each tip weighted by its error along the normal.
@@ -47,8 +57,9 @@ def plane_of(track: TipTrack, towards: FloatArray) -> DrawnPlane:
         towards: a direction (3,) to the side that is removed.
 
     Raises:
-        BadInput: fewer than three tips, or all on one line.
+        BadInput: fewer than three tips, all on one line, or a direction that is zero or does not tell the side.
     """
+    towards = unit_vector(towards, "The direction to the removed side")
     plane = fit_plane(track.points_mm, towards).plane
     for _ in range(_ROUNDS):
         rows, off, variances, middle = _equations(track, plane)
@@ -65,7 +76,14 @@ def plane_of(track: TipTrack, towards: FloatArray) -> DrawnPlane:
     information = (rows / variances[:, None]).T @ rows
     covariance = np.asarray(np.linalg.inv(information) * max(misfit, 1.0), dtype=np.float64)
     covariance[2, 2] += 1.0 / float(np.mean(1.0 / variances))
-    return DrawnPlane(plane, covariance, float(np.sqrt(np.mean(off**2))), misfit)
+    drawn = DrawnPlane(plane, covariance, float(np.sqrt(np.mean(off**2))), misfit)
+    across_deg = float(np.degrees(np.arcsin(min(abs(float(towards @ plane.normal)), 1.0))))
+    if drawn.status.is_good and across_deg < max(_ACROSS_DEG, _SIGMAS * np.degrees(drawn.tilt_sigma_rad)):
+        raise BadInput(
+            f"The direction to the removed side is {across_deg:.1f}° off the drawn plane, which is known to "
+            f"{np.degrees(drawn.tilt_sigma_rad):.1f}°, and does not tell the side; give one that goes across it."
+        )
+    return drawn
 
 
 def _equations(track: TipTrack, plane: Plane) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

@@ -33,10 +33,16 @@ def at_distance(tracks: Tracks, camera: Camera, distance_mm: float) -> Tracks:
     """Tracks in mm across a calibrated camera's axis, without its distortion, of tissue at a distance along the axis.
 
     Raises:
-        BadInput: the tracks are not in px, or the distance is not positive.
+        BadInput: the tracks are not in px or lie outside the camera's image, or the distance is not positive.
     """
     if not (np.isfinite(distance_mm) and distance_mm > 0.0):
         raise BadInput(f"The tissue's distance must be positive, not {distance_mm} mm.")
+    outside = (tracks.places < -0.5) | (tracks.places > np.array([camera.width, camera.height]) - 0.5)
+    if tracks.unit == "px" and outside.any():
+        raise BadInput(
+            f"The tracks leave the camera's image of {camera.width} × {camera.height} px; give the camera that took "
+            "the video."
+        )
     still = RigidTransform("room", "camera", np.eye(3), np.zeros(3))
     points, covariance = on_plane(tracks, camera, [still], [0.0, 0.0, distance_mm], [0.0, 0.0, 1.0])
     return replace(tracks, places=points[:, :, :2], covariance=covariance[:, :, :2, :2], unit="mm")

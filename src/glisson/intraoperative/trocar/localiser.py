@@ -32,6 +32,9 @@ _REACHES_PX = (5.0, 3.0, 3.0)
 _MISFIT = 2.0
 """With residuals this many times as large as they should be, another size of the crosses is tried."""
 
+_UNUSUAL = 1.5
+"""Residuals this many times as large as they should be are told; those of good cameras and layouts came to 1.4."""
+
 
 @dataclass(frozen=True)
 class LocaliserParameters:
@@ -59,11 +62,11 @@ class CrossLocaliser(ABC):
         """See `glisson.core.protocols.Localiser`."""
         if image.shape != (camera.height, camera.width, 3) or image.dtype != np.uint8:
             raise BadInput(
-                f"The image is {' × '.join(map(str, image.shape))}, but its camera takes colour images of "
-                f"{camera.height} × {camera.width} px; give the camera that took it."
+                f"The image is {image.shape[1]} × {image.shape[0]} px{'' if image.ndim == 3 else ' and grey'}, but its "
+                f"camera takes colour images of {camera.width} × {camera.height} px; give the camera that took it."
             )
         reading = read_crosses(image, cross_outlines(image), layout)
-        if (refusal := _refusal(reading, layout)) is not None:
+        if (refusal := _refusal(reading, layout, grey=bool((image == image[:, :, :1]).all()))) is not None:
             return refusal
         count = len(reading.crosses)
         numbers = np.repeat([one.number for one in reading.crosses], 12).astype(np.int64)
@@ -109,6 +112,7 @@ class CrossLocaliser(ABC):
             found.bound_mm,
             found.bound_rad,
             float(np.sqrt(np.median(variance)) * camera.focal_px.mean() * found.scale),
+            _notes(found, camera, layout),
         )
 
     def _status(self, found: FoundPose) -> tuple[Status, str]:
@@ -119,11 +123,12 @@ class CrossLocaliser(ABC):
             return Status.AMBIGUOUS, (
                 f"A second pose, {apart:.0f} mm away, explains the crosses as well; show the camera more of them."
             )
-        limit_rad = np.deg2rad(self._parameters.angle_limit_deg)
-        if found.bound_mm > self._parameters.position_limit_mm or found.bound_rad > limit_rad:
+        limit_mm, limit_deg = self._parameters.position_limit_mm, self._parameters.angle_limit_deg
+        bound_deg = float(np.rad2deg(found.bound_rad))
+        if found.bound_mm > limit_mm or bound_deg > limit_deg:
             return Status.UNOBSERVABLE, (
-                f"The position may err by {found.bound_mm:.1f} mm and the orientation by "
-                f"{np.rad2deg(found.bound_rad):.2f}° in one of 10,000 cases, more than the limits; show the camera "
+                f"In one of 10,000 cases the position may err by {found.bound_mm:.2f} mm and the orientation by "
+                f"{bound_deg:.3f}°; the limits are {limit_mm:g} mm and {limit_deg:g}°. Show the camera "
                 "crosses that are farther apart."
             )
         return Status.CONVERGED, Status.CONVERGED.sentence
@@ -134,7 +139,25 @@ def _of_trocar(camera_from_room: RigidTransform) -> RigidTransform:
     return RigidTransform("room", "trocar", pose.rotation, pose.translation_mm, pose.covariance)
 
 
-def _refusal(reading: Reading, layout: CrossLayout) -> Localisation | None:
+def _notes(found: FoundPose, camera: Camera, layout: CrossLayout) -> tuple[str, ...]:
+    notes = []
+    if camera.covariance is None:
+        notes.append(
+            "The camera has no covariance and is taken as exact: the bounds do not count how well it is known."
+        )
+    if any(cross.room_from_cross.covariance is None for cross in layout.crosses):
+        notes.append(
+            "The crosses' places have no covariance and are taken as exact: the bounds do not count how they were hung."
+        )
+    if found.scale > _UNUSUAL:
+        notes.append(
+            f"The corners are {found.scale:.1f} times as far off as they should be, so the pose may err by more than "
+            "the bounds: is it this camera, with this lens and focus, and do the crosses hang where the layout says?"
+        )
+    return tuple(notes)
+
+
+def _refusal(reading: Reading, layout: CrossLayout, *, grey: bool) -> Localisation | None:
     """What is told where too little can be read for a pose."""
     if reading.mirrored > len(reading.crosses):
         return Localisation(
@@ -151,7 +174,8 @@ def _refusal(reading: Reading, layout: CrossLayout) -> Localisation | None:
             crosses=names,
             corners_px=reading.crosses[0].corners_px,
         )
-    return Localisation(Status.UNOBSERVABLE, f"No cross of the layout can be read in the image.{others}")
+    why = ", which is grey: crosses are told by their colours" if grey else ""
+    return Localisation(Status.UNOBSERVABLE, f"No cross of the layout can be read in the image{why}.{others}")
 
 
 def _count(foreign: int) -> str:

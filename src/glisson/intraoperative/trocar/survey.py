@@ -18,6 +18,13 @@ from glisson.intraoperative.trocar.outlines import cross_outlines
 from glisson.intraoperative.trocar.pose import global_pose
 from glisson.intraoperative.trocar.reading import read_crosses
 
+_FACTOR = 2.0
+"""A measured distance that makes the crosses larger or smaller by more is in another unit, or of other crosses."""
+
+_AS_PRINTED = 0.02
+"""Prints at true scale are as large as the layout says but for this share, and the sigmas below."""
+_SIGMAS = 4.0
+
 
 @dataclass(frozen=True)
 class Distance:
@@ -43,6 +50,16 @@ class Survey:
     residual_px: float
     views: int
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences on what a person should look at."""
+        if abs(self.size_factor - 1.0) < _AS_PRINTED + _SIGMAS * self.size_sigma:
+            return ()
+        return (
+            f"By the measured distance the crosses are {self.size_factor:.3f} times as large as the layout says: "
+            "measure the distance again, and a cross on its sheet; all places err as the distance does.",
+        )
+
 
 def survey_layout(
     images: Sequence[NDArray[np.uint8]], camera: Camera, layout: CrossLayout, distance: Distance
@@ -59,9 +76,11 @@ def survey_layout(
         distance: sets the scale.
 
     Raises:
-        BadInput: the distance names no cross.
+        BadInput: there are not two images, or the distance names no cross or cannot be that of the two.
         StageFailed: a cross is not seen often enough or not linked to the first.
     """
+    if len(images) < 2:
+        raise BadInput("A survey needs two images at least; take 20 or more, each cross in several of them.")
     names = [cross.name for cross in layout.crosses]
     if distance.first == distance.second or not {distance.first, distance.second} <= set(names):
         raise BadInput(f"The measured distance must be between two of the crosses {', '.join(names)}.")
@@ -75,13 +94,23 @@ def survey_layout(
                 f"The cross {name!r} is not seen beside another in two images; take more of it.", Status.UNOBSERVABLE
             )
     bundle = _linked(views, camera, layout)
-    result = adjusted(bundle, camera, layout, names.index(distance.first), names.index(distance.second),
-                      distance.length_mm, distance.sigma_mm)  # fmt: skip
+    first, second = names.index(distance.first), names.index(distance.second)
+    _check_distance(bundle, first, second, distance)
+    result = adjusted(bundle, camera, layout, first, second, distance.length_mm, distance.sigma_mm)
     crosses = tuple(
         replace(cross, size_mm=cross.size_mm * result.size_factor, room_from_cross=place)
         for cross, place in zip(layout.crosses, result.places, strict=True)
     )
     return Survey(CrossLayout(crosses), result.size_factor, result.size_sigma, result.residual_px, len(views))
+
+
+def _check_distance(bundle: Bundle, first: int, second: int, distance: Distance) -> None:
+    apart = float(np.linalg.norm(bundle.places[second].translation_mm - bundle.places[first].translation_mm))
+    if not 1.0 / _FACTOR < distance.length_mm / apart < _FACTOR:
+        raise BadInput(
+            f"If the crosses are as large as the layout says, {distance.first!r} and {distance.second!r} hang about "
+            f"{apart:.0f} mm apart, not {distance.length_mm:g} mm; give the measured distance of their middles in mm."
+        )
 
 
 def _corners(image: NDArray[np.uint8], camera: Camera, layout: CrossLayout) -> SeenCorners | None:
