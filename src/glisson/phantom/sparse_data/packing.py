@@ -33,8 +33,9 @@ _RIGHT = ((-90.0, -12.0), (-62.0, 32.0), (-52.0, -42.0))
 _LEFT = ((26.0, 6.0), (54.0, 24.0))
 """Where packs may lie under a lobe of the nominal member, x and z in mm."""
 
-_PUSH_MM, _ASIDE_MM = (10.0, 18.5), 5.0
+_PUSH_MM, _ASIDE_MM = (13.0, 22.0), 5.0
 _RADIUS_MM = (30.0, 42.0)
+_APART_MM = 10.0
 _SHARE_OF_WEIGHT = (0.1, 0.4)
 
 
@@ -59,9 +60,12 @@ class Packing:
     ligament_kpa_mm: float
 
 
-def draw_packing(seed: int, member: int, deformation: int) -> Packing:
-    """How a liver is packed: a pack under either lobe, and sometimes a second one under the right."""
-    random = np.random.default_rng([seed, member, deformation, 4])
+def draw_packing(seed: int, member: int, deformation: int, attempt: int = 0) -> Packing:
+    """How a liver is packed: a pack under either lobe, and sometimes a second one under the right.
+
+    Another `attempt` is another draw, for packings under which the tissue finds no equilibrium.
+    """
+    random = np.random.default_rng([seed, member, deformation, 4, attempt])
     proportions = draw_proportions(member)
     right = random.permutation(len(_RIGHT))[: int(random.integers(1, 3))]
     places = [*(_RIGHT[place] for place in right), _LEFT[int(random.integers(len(_LEFT)))]]
@@ -122,14 +126,15 @@ def _held(mesh: TetMesh, liver: SparseLiver) -> dict[str, IntArray]:
 
 
 def _pack_sets(mesh: TetMesh, packs: Sequence[Pack], fixed: IntArray) -> dict[str, IntArray]:
-    """Nodes of each pack without fixed ones; one that two packs would have belongs to the first."""
+    """Nodes of each pack, which keeps off what is fixed and off those before it."""
     surface, normals = _surface_nodes(mesh)
-    free = (normals[:, 1] > _UNDERSIDE) & ~np.isin(surface, fixed)
+    off_fixed, _ = cKDTree(mesh.nodes[fixed]).query(mesh.nodes[surface])
+    free = (normals[:, 1] > _UNDERSIDE) & (off_fixed > _APART_MM)
     sets = {}
     for number, pack in enumerate(packs):
-        near = free & (np.linalg.norm(mesh.nodes[surface] - pack.point_mm, axis=1) < pack.radius_mm)
-        free &= ~near
-        sets[f"pack {number}"] = surface[near]
+        away = np.linalg.norm(mesh.nodes[surface] - pack.point_mm, axis=1)
+        sets[f"pack {number}"] = surface[free & (away < pack.radius_mm)]
+        free &= away > pack.radius_mm + _APART_MM
     return sets
 
 

@@ -64,6 +64,7 @@ class SparseDataTwin:
             "rows": table_rows(found),
             "totals": totals(found),
             "cases": len(self.design.cases()),
+            "redrawn": sum(prepared[point.key].values["redrawn"] for point in self._truths.values()),
             "failed": [f"{s.technique}, case {s.case.number}: {s.message}" for s in found if not s.errors_mm],
             "unfinished": sum(point.key not in done for point in points),
         }

@@ -26,6 +26,8 @@ def as_lines(values: Mapping[str, Any]) -> list[str]:
                 f"{row['milliseconds']['p95']:.0f} ms; {row['flagged']} of {row['cases']} with a status other than "
                 "converged"
             )
+    if values["redrawn"]:
+        lines.append(f"redrawn   {values['redrawn']} packings under which the truth found no equilibrium")
     lines += [f"failed    {message}" for message in values["failed"]]
     if values["unfinished"]:
         lines.append(f"note      {values['unfinished']} points are not done yet; run again to go on")
@@ -51,7 +53,7 @@ def as_page(values: Mapping[str, Any], shown: Sequence[Picture]) -> bytes:
     lead = [
         f"{values['cases']} cases of livers of which 20 to 44 % of the surface is seen. They are a twin of the "
         "Sparse Data Challenge's, not its data: nothing here says how a technique would do there.",
-        *(line for line in as_lines(values) if line.startswith(("failed", "note"))),
+        *(line for line in as_lines(values) if line.startswith(("redrawn", "failed", "note"))),
     ]
     return page_as_html(Page("Registration from sparse surface data", lead, shown, [errors]))
 

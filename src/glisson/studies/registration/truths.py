@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from glisson import mechanics
+from glisson.core.arrays import FloatArray
 from glisson.core.errors import StageFailed
 from glisson.core.mesh import TetMesh
 from glisson.core.status import Status
@@ -32,6 +33,8 @@ _SOLVER = tuple(
 
 PACK = Task(f"{__name__}:pack_liver", (*PACKAGES, *_SOLVER, "glisson.preoperative.meshing", __name__))
 
+_ATTEMPTS = 3
+
 TRUTH_EDGE_MM = 14.0
 """Some 10,000 quadratic elements, where the models under test are coarser and may be linear."""
 
@@ -45,17 +48,22 @@ def truth_point(seed: int, member: int, packings: int) -> Point:
 
 def pack_liver(inputs: Mapping[str, Any], folder: Path) -> Outcome:
     """Displacements (packings, n, 3) in mm of one T10 mesh of a liver."""
-    member, liver = inputs["member"], build_sparse_liver(inputs["member"])
+    member = inputs["member"]
     mesh = member_mesh(draw_proportions(member), inputs["edge_mm"]).as_quadratic()
-    found = []
-    for number in range(inputs["packings"]):
-        model, scenario = packed(draw_packing(inputs["seed"], member, number), mesh, liver)
-        deformation = QuasiStatic(QuasiStaticParameters()).solve(model, scenario)
-        if deformation.status is not Status.CONVERGED:
-            raise StageFailed(f"Liver {member}, packing {number}: {deformation.message}", deformation.status)
-        found.append(deformation.displacement)
+    numbers = range(inputs["packings"])
+    found, attempts = zip(*(_packed(mesh, inputs["seed"], member, number) for number in numbers), strict=True)
     arrays = {"nodes": mesh.nodes, "tetrahedra": mesh.tetrahedra, "displacements": np.array(found)}
-    return Outcome({"elements": len(mesh.tetrahedra)}, arrays)
+    return Outcome({"elements": len(mesh.tetrahedra), "redrawn": sum(attempts)}, arrays)
+
+
+def _packed(mesh: TetMesh, seed: int, member: int, number: int) -> tuple[FloatArray, int]:
+    """Displacements (n, 3) of the first draw that comes to rest, and how many did not before it."""
+    for attempt in range(_ATTEMPTS):
+        model, scenario = packed(draw_packing(seed, member, number, attempt), mesh, build_sparse_liver(member))
+        deformation = QuasiStatic(QuasiStaticParameters()).solve(model, scenario)
+        if deformation.status is Status.CONVERGED:
+            return deformation.displacement, attempt
+    raise StageFailed(f"Liver {member}, packing {number}: {deformation.message}", deformation.status)
 
 
 def build_case(design: CaseDesign, folder: Path, truth: str | None) -> SparseCase:
