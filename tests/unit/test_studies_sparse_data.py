@@ -11,7 +11,6 @@ from glisson.core import Deformation, Model, Observations, StageResult, Status
 from glisson.core.registered import Registered
 from glisson.framework.pipeline import Unheard
 from glisson.geometry.location import PointLocator
-from glisson.geometry.mapping import PointMap
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
 from glisson.phantom.proportions import draw_proportions
 from glisson.phantom.sparse_data.case import SparseCase, bend_of, make_case
@@ -25,6 +24,7 @@ from glisson.studies.registration.rows import Score, flat, scores, table_rows, t
 from glisson.studies.registration.scoring import BEST, BEST_OF_DATA, NOTHING, register_case, target_errors
 from glisson.studies.registration.solving_model import make_model, model_point, read_model
 from glisson.studies.registration.study import SparseDataTwin
+from glisson.studies.registration.truths import with_its_skin
 from glisson.studies.store import PointStore
 from glisson.studies.study import run_study
 from studies_in_process import InThisProcess
@@ -137,7 +137,10 @@ def test_packs_carry_the_underside_and_gravity_and_ligaments_the_rest() -> None:
         moved = found.displacement[model.node_set(f"pack {number}")]
         np.testing.assert_allclose(moved, np.broadcast_to(pack.displacement_mm, moved.shape), atol=1e-9)
     assert np.abs(found.displacement[model.node_set("vena cava")]).max() == 0.0
-    carried = PointMap(found.mesh, found.displacement).forward(liver.surface.vertices)
+    carried = with_its_skin(found.mesh, found.displacement)(liver.surface.vertices)
+    nodes = np.unique(found.mesh.boundary()[0])
+    at_nodes = with_its_skin(found.mesh, found.displacement)(found.mesh.nodes[nodes])
+    np.testing.assert_allclose(at_nodes, found.mesh.moved(found.displacement)[nodes], atol=1e-6)
     volume = replace(liver.surface, vertices=carried).volume_mm3
     assert volume == pytest.approx(liver.surface.volume_mm3, rel=0.03)
     assert draw_packing(0, member, 1) == packing

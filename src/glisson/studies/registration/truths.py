@@ -12,6 +12,7 @@ from glisson.core.arrays import FloatArray
 from glisson.core.errors import StageFailed
 from glisson.core.mesh import TetMesh
 from glisson.core.status import Status
+from glisson.geometry.distance import SurfaceTree
 from glisson.geometry.mapping import PointMap
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
 from glisson.phantom.proportions import draw_proportions
@@ -86,4 +87,21 @@ def carry_of(design: CaseDesign, folder: Path, truth: str | None) -> Carry:
         return bend_of(design, build_sparse_liver(design.member)).forward
     arrays = read_arrays(folder, truth)
     mesh = TetMesh(arrays["nodes"], arrays["tetrahedra"])
-    return PointMap(mesh, arrays["displacements"][design.deformation]).forward
+    return with_its_skin(mesh, arrays["displacements"][design.deformation])
+
+
+def with_its_skin(mesh: TetMesh, displacement: FloatArray) -> Carry:
+    """The map of a displacement (n, 3); what lies just outside the mesh moves as the nearest point of its surface does.
+
+    To go on linearly would roughen the surface where an element under it is strained much.
+    """
+    moved, skin = PointMap(mesh, displacement), mesh.surface()
+    tree = SurfaceTree(skin.vertices, skin.triangles)
+
+    def carry(points: FloatArray) -> FloatArray:
+        within = np.array(points, dtype=np.float64)
+        outside = moved.locate(within).distance_mm > 0.0
+        within[outside] = tree.nearest(within[outside]).closest_mm
+        return np.asarray(points) + moved.forward(within) - within
+
+    return carry
