@@ -40,6 +40,7 @@ COMMANDS = {
     "resections": "list what each liver resection would take of the segments, and what would remain",
     "calibrate": "calibrate a camera, hand and eye, a tool's tip or a scope's geometry",
     "reconstruct": "find surface points from two or more laparoscope views and one touched point",
+    "register": "find the liver as it is now from sparse observations, and tell how sure that is",
     "export": "write the labels of a case as one segmentation for other programs (3D Slicer, DICOM)",
     "deidentify": "copy DICOM files without what tells who the patient is (the standard's basic profile)",
     "layout": "propose where crosses should hang in a room, or measure where they do",

@@ -5,6 +5,7 @@ from typing import ClassVar
 
 from glisson.core.model import Model
 from glisson.core.observations import Observations
+from glisson.core.parameters import parameter
 from glisson.core.protocols import Progress, silent
 from glisson.core.registered import Registered
 from glisson.mechanics.registration.checks import check_observations
@@ -18,16 +19,14 @@ from glisson.mechanics.registration.seen import ModelError, Seen
 
 @dataclass(frozen=True)
 class FreeParameters:
-    """Of the free body.
+    """Parameters of the free body."""
 
-    `strain` is the typical strain that is expected; the model's error is in mm, over which length (mm) alike; `modes`
-    is how many of the least certain ways to move are told.
-    """
-
-    strain: float = 0.05
-    model_error_mm: float = 1.0
-    model_error_length_mm: float = 10.0
-    modes: int = 60
+    strain: float = parameter(0.05, "typical strain that is expected of the organ", minimum=1e-4)
+    model_error_mm: float = parameter(1.0, "how far the model cannot follow the organ, mm", minimum=1e-3)
+    model_error_length_mm: float = parameter(
+        10.0, "over which length points are off alike by the model's error, mm", minimum=1e-3
+    )
+    modes: int = parameter(60, "how many of the least certain ways to move are told", minimum=6)
 
 
 class Free:

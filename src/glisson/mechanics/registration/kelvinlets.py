@@ -8,6 +8,7 @@ import numpy as np
 from glisson.core.arrays import FloatArray
 from glisson.core.model import Model
 from glisson.core.observations import Observations
+from glisson.core.parameters import parameter
 from glisson.core.protocols import Progress, silent
 from glisson.core.registered import Registered
 from glisson.geometry.quadratic import straight_boundary
@@ -22,17 +23,15 @@ from glisson.mechanics.registration.seen import ModelError
 
 @dataclass(frozen=True)
 class KelvinletsParameters:
-    """Of the Kelvinlets.
+    """Parameters of the Kelvinlets."""
 
-    `centres` is the number of places on the surface at which forces act, `radius_mm` how blunt they are;
-    `strain` is the typical strain that is expected; the model's error is in mm, over which length (mm) alike.
-    """
-
-    centres: int = 45
-    radius_mm: float = 30.0
-    strain: float = 0.1
-    model_error_mm: float = 1.0
-    model_error_length_mm: float = 10.0
+    centres: int = parameter(45, "number of places on the surface at which forces act", minimum=3)
+    radius_mm: float = parameter(30.0, "how blunt the forces are, mm", minimum=1.0)
+    strain: float = parameter(0.1, "typical strain that is expected of the organ", minimum=1e-4)
+    model_error_mm: float = parameter(1.0, "how far the model cannot follow the organ, mm", minimum=1e-3)
+    model_error_length_mm: float = parameter(
+        20.0, "over which length points are off alike by the model's error, mm", minimum=1e-3
+    )
 
 
 class Kelvinlets:

@@ -7,6 +7,7 @@ import numpy as np
 
 from glisson.core.model import Model
 from glisson.core.observations import Observations
+from glisson.core.parameters import parameter
 from glisson.core.protocols import Progress, silent
 from glisson.core.registered import Registered
 from glisson.mechanics.registration.basis import boundary_responses
@@ -19,16 +20,14 @@ from glisson.mechanics.registration.seen import ModelError
 
 @dataclass(frozen=True)
 class LinearBasisParameters:
-    """Of the linear basis.
+    """Parameters of the linear basis."""
 
-    `controls` is the number of points of the surface that move;
-    `strain` is the typical strain that is expected; the model's error is in mm, over which length (mm) alike.
-    """
-
-    controls: int = 45
-    strain: float = 0.1
-    model_error_mm: float = 1.0
-    model_error_length_mm: float = 20.0
+    controls: int = parameter(45, "number of points of the surface that move", minimum=3)
+    strain: float = parameter(0.1, "typical strain that is expected of the organ", minimum=1e-4)
+    model_error_mm: float = parameter(1.0, "how far the model cannot follow the organ, mm", minimum=1e-3)
+    model_error_length_mm: float = parameter(
+        20.0, "over which length points are off alike by the model's error, mm", minimum=1e-3
+    )
 
 
 class LinearBasis:

@@ -5,6 +5,7 @@ from typing import ClassVar
 
 from glisson.core.model import Model
 from glisson.core.observations import Observations
+from glisson.core.parameters import parameter
 from glisson.core.protocols import Progress, silent
 from glisson.core.registered import Registered
 from glisson.mechanics.registration.checks import check_observations
@@ -16,10 +17,14 @@ from glisson.mechanics.registration.seen import ModelError, Seen
 
 @dataclass(frozen=True)
 class RigidParameters:
-    """How far a rigid organ is off (mm), and over which length (mm) alike."""
+    """Parameters of the rigid organ."""
 
-    model_error_mm: float = RIGID_ERROR.sigma_mm
-    model_error_length_mm: float = RIGID_ERROR.length_mm
+    model_error_mm: float = parameter(
+        RIGID_ERROR.sigma_mm, "how far the model cannot follow the organ, mm", minimum=1e-3
+    )
+    model_error_length_mm: float = parameter(
+        RIGID_ERROR.length_mm, "over which length points are off alike by the model's error, mm", minimum=1e-3
+    )
 
 
 class Rigid:

@@ -1,0 +1,80 @@
+"""`glisson register`: the liver as it is now, from sparse observations."""
+
+import argparse
+import time
+from dataclasses import fields
+from typing import Any
+
+from glisson.cli.command import Command
+from glisson.cli.console import Answer
+from glisson.cli.options import add_case
+from glisson.cli.progress import StageLines
+from glisson.core.registry import list_techniques, technique_class
+from glisson.framework.case import open_case
+from glisson.framework.registering import LINEAR_BASIS, RegisteredCase, answer_values, register_case
+
+_KEYS = (
+    "status", "message", "technique", "frame", "unobserved", "set_aside", "sigma_mm", "tumours", "notes", "folder",
+    "seconds",
+)  # fmt: skip
+
+
+def _add_arguments(parser: argparse.ArgumentParser) -> None:
+    add_case(parser)
+    parser.add_argument(
+        "--observations", metavar="FILE", help="what was seen (see docs/registration.md); default the case's own"
+    )
+    parser.add_argument(
+        "--technique", metavar="NAME", default=LINEAR_BASIS, help=f"see glisson techniques; by default {LINEAR_BASIS}"
+    )
+    for name, words in _explained().items():
+        parser.add_argument(f"--{name.replace('_', '-')}", dest=name, metavar="VALUE", help=words)
+
+
+def _explained() -> dict[str, str]:
+    """The parameters of all techniques, each with its help and the techniques that have it."""
+    explained: dict[str, tuple[str, list[str]]] = {}
+    for listing in list_techniques(("registration",)):
+        if listing.is_available:
+            for field in fields(technique_class("registration", listing.name).Parameters):
+                words = str(field.metadata["help"]).rstrip(".")
+                explained.setdefault(field.name, (words, []))[1].append(f"{listing.name}, default {field.default:g}")
+    return {name: f"{words} ({'; '.join(techniques)})" for name, (words, techniques) in explained.items()}
+
+
+def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
+    started = time.perf_counter()
+    parameters = {name: value for name in _explained() if (value := getattr(arguments, name)) is not None}
+    case = open_case(arguments.case)
+    progress = lines.begun("register", "it was asked for")
+    made = register_case(case, arguments.observations, arguments.technique, parameters, progress)
+    seconds = time.perf_counter() - started
+    lines.ended("register", seconds)
+    values = answer_values(made.found, made.tumours) | {"technique": arguments.technique, "folder": str(made.folder)}
+    return Answer(values | {"seconds": seconds}, _text(made, values), 0 if made.found.status.is_good else 1)
+
+
+def _text(made: RegisteredCase, values: dict[str, Any]) -> str:
+    told = [f"status      {values['message']}"]
+    for tumour in made.tumours:
+        x, y, z = tumour.after_mm
+        told.append(
+            f"{tumour.name:11} now at {x:.1f}, {y:.1f}, {z:.1f} mm ({made.found.frame}), within "
+            f"{tumour.radius95_mm:.1f} mm by 95 %"
+        )
+    told.append(f"elsewhere   known to {values['sigma_mm']:.1f} mm (one standard deviation, median of the nodes)")
+    if made.found.set_aside > 0.0:
+        told.append(f"set aside   {100.0 * made.found.set_aside:.0f} % of the observed points as outliers")
+    told += [f"look at     {note}" for note in made.found.notes]
+    return "\n".join([*told, f"written     {made.folder}"])
+
+
+COMMAND = Command(
+    "register",
+    "  glisson register liver\n"
+    "  glisson register liver --observations swab.json --technique free\n"
+    "  glisson register liver --strain 0.05 --json",
+    _add_arguments,
+    _run,
+    _KEYS,
+)
