@@ -9,23 +9,19 @@ from glisson.core.parameters import parameter
 from glisson.core.protocols import Progress, silent
 from glisson.core.registered import Registered
 from glisson.mechanics.registration.checks import check_observations
+from glisson.mechanics.registration.elastic_parameters import ElasticParameters
 from glisson.mechanics.registration.expected_energy import energy_per_mode_uj
 from glisson.mechanics.registration.full_fit import FullFit
 from glisson.mechanics.registration.motion import BasisMotion
 from glisson.mechanics.registration.outcome import outcome
 from glisson.mechanics.registration.placing import RIGID_ERROR, placed
-from glisson.mechanics.registration.seen import ModelError, Seen
+from glisson.mechanics.registration.seen import Seen
 
 
 @dataclass(frozen=True)
-class FreeParameters:
+class FreeParameters(ElasticParameters):
     """Parameters of the free body."""
 
-    strain: float = parameter(0.05, "typical strain that is expected of the organ", minimum=1e-4)
-    model_error_mm: float = parameter(1.0, "how far the model cannot follow the organ, mm", minimum=1e-3)
-    model_error_length_mm: float = parameter(
-        10.0, "over which length points are off alike by the model's error, mm", minimum=1e-3
-    )
     modes: int = parameter(60, "how many of the least certain ways to move are told", minimum=6)
 
 
@@ -51,7 +47,7 @@ class Free:
         rigid = BasisMotion(model.mesh.nodes)
         place = placed(model, observations, Seen(model, observations, RIGID_ERROR), rigid)
         chosen = self._parameters
-        seen = Seen(model, observations, ModelError(chosen.model_error_mm, chosen.model_error_length_mm))
+        seen = Seen(model, observations, chosen.model_error)
         progress(0.4, "deforming the organ")
         full = FullFit(model, seen, energy_per_mode_uj(model, chosen.strain))
         try:

@@ -13,21 +13,16 @@ from glisson.core.registered import Registered
 from glisson.mechanics.registration.basis import boundary_responses
 from glisson.mechanics.registration.checks import check_observations
 from glisson.mechanics.registration.elastic_fit import elastic_fit
+from glisson.mechanics.registration.elastic_parameters import ElasticParameters
 from glisson.mechanics.registration.expected_energy import energy_per_mode_uj
 from glisson.mechanics.registration.motion import BasisMotion
-from glisson.mechanics.registration.seen import ModelError
 
 
 @dataclass(frozen=True)
-class LinearBasisParameters:
+class LinearBasisParameters(ElasticParameters):
     """Parameters of the linear basis."""
 
     controls: int = parameter(45, "number of points of the surface that move", minimum=3)
-    strain: float = parameter(0.1, "typical strain that is expected of the organ", minimum=1e-4)
-    model_error_mm: float = parameter(1.0, "how far the model cannot follow the organ, mm", minimum=1e-3)
-    model_error_length_mm: float = parameter(
-        20.0, "over which length points are off alike by the model's error, mm", minimum=1e-3
-    )
 
 
 class LinearBasis:
@@ -53,5 +48,4 @@ class LinearBasis:
         modes = boundary_responses(model, chosen.controls)
         precision = np.diag(2.0 * modes.energies_uj / energy_per_mode_uj(model, chosen.strain))
         motion = BasisMotion(model.mesh.nodes, modes.basis, precision)
-        error = ModelError(chosen.model_error_mm, chosen.model_error_length_mm)
-        return elastic_fit(model, observations, motion, error, progress)
+        return elastic_fit(model, observations, motion, chosen.model_error, progress)

@@ -9,6 +9,7 @@ from glisson.core.parameters import parameter
 from glisson.core.protocols import Progress, silent
 from glisson.core.registered import Registered
 from glisson.mechanics.registration.checks import check_observations
+from glisson.mechanics.registration.elastic_parameters import ERROR_HELP, LENGTH_HELP
 from glisson.mechanics.registration.motion import BasisMotion
 from glisson.mechanics.registration.outcome import outcome, posterior_spread
 from glisson.mechanics.registration.placing import RIGID_ERROR, placed
@@ -19,12 +20,8 @@ from glisson.mechanics.registration.seen import ModelError, Seen
 class RigidParameters:
     """Parameters of the rigid organ."""
 
-    model_error_mm: float = parameter(
-        RIGID_ERROR.sigma_mm, "how far the model cannot follow the organ, mm", minimum=1e-3
-    )
-    model_error_length_mm: float = parameter(
-        RIGID_ERROR.length_mm, "over which length points are off alike by the model's error, mm", minimum=1e-3
-    )
+    model_error_mm: float = parameter(RIGID_ERROR.sigma_mm, ERROR_HELP, minimum=1e-3)
+    model_error_length_mm: float = parameter(RIGID_ERROR.length_mm, LENGTH_HELP, minimum=1e-3)
 
 
 class Rigid:
