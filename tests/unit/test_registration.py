@@ -198,13 +198,13 @@ def test_a_deformation_of_the_basis_is_found(model: Model) -> None:
     assert off < 0.1 * stiff
 
 
-def test_an_incompressible_bend_is_followed_by_the_free_body(model: Model) -> None:
-    """A closed form that no basis of ours holds; from the whole surface the inside follows."""
+def test_an_incompressible_bend_is_followed_into_the_inside(model: Model) -> None:
+    """A closed form that no basis of ours holds, seen all over the surface and at 120 marks of it."""
     rng = np.random.default_rng(2)
     whole = replace(model, node_sets={"upper": np.unique(model.mesh.boundary()[0])})
     there = bent_without_change_of_volume(model.mesh.nodes, 220.0)
     surface = np.unique(model.mesh.boundary()[0])
-    corners = {f"corner {number}": [number] for number in surface[evenly_spread(model.mesh.nodes[surface], 40)]}
+    corners = {f"corner {number}": [number] for number in surface[evenly_spread(model.mesh.nodes[surface], 120)]}
     whole = replace(whole, node_sets={**whole.node_sets, **corners})
     marks = [Observation("landmark", name, there[nodes], 0.2, "room") for name, nodes in corners.items()]
     seen = Observations((seen_surface(whole, there, rng, 0.2, count=1500), *marks))
@@ -215,8 +215,7 @@ def test_an_incompressible_bend_is_followed_by_the_free_body(model: Model) -> No
         found = registered(technique, whole, seen, model_error_mm=0.05)
         errors[technique] = np.linalg.norm(inside.interpolate(targets, found.positions_mm - there), axis=1).mean()
     assert errors["rigid"] > 2.0
-    assert errors["free"] < 0.25 * errors["rigid"]
-    assert errors["linear-basis"] < 0.5 * errors["rigid"]
+    assert max(errors["free"], errors["linear-basis"]) < errors["rigid"] / 3.0
 
 
 def test_what_cannot_be_used_is_refused(model: Model) -> None:
