@@ -1,0 +1,86 @@
+"""Makes a reduced model from full solutions."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from glisson.core.arrays import FloatArray, IntArray
+from glisson.mechanics.reduced.basis import modes
+from glisson.mechanics.reduced.contact import reduced_surface
+from glisson.mechanics.reduced.cubature import Cubature, choose_points
+from glisson.mechanics.reduced.estimate import ErrorEstimate
+from glisson.mechanics.reduced.full import FullModel
+from glisson.mechanics.reduced.model import ReducedModel
+from glisson.mechanics.reduced.points import ElasticPoints, elastic_points, some_points
+
+_SENTINELS = 200
+_EQUATIONS = 3  # mixed ones for each point that may be chosen
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Unknowns r and points of the solution, modes R and points of its error estimate, and how exact points are."""
+
+    unknowns: int = 60
+    points: int = 400
+    estimate_unknowns: int = 150
+    estimate_points: int = 1000
+    tolerance: float = 3e-4
+
+
+def build_reduced(full: FullModel, displacements: FloatArray, sizes: Sizes) -> ReducedModel:
+    """A reduced model, its estimate not calibrated yet, from displacements (s, n, 3) of full solutions in mm."""
+    basis = modes(displacements, sizes.estimate_unknowns)
+    count = min(sizes.unknowns, basis.shape[2])
+    every = elastic_points(full.model.mesh, full.model.materials, basis)
+    states = np.tensordot(displacements, basis, 2)
+    stiffness = every.stiffness(np.zeros(basis.shape[2]), project=False)
+    few = ElasticPoints(np.ascontiguousarray(every.strains[:, :, :count]), every.weights, every.regions, every.materials)
+    chosen = _cubature(few, states[:, :count], stiffness[:count, :count], sizes.points, sizes.tolerance)
+    estimating = _cubature(every, states, stiffness, sizes.estimate_points, sizes.tolerance)
+    mesh, surface = full.model.mesh, full.surface
+    estimate = ErrorEstimate(
+        some_points(every, estimating.points, estimating.factors),
+        reduced_surface(mesh, surface, basis),
+        stiffness,
+        basis[_spread(mesh.nodes, np.unique(surface.nodes), _SENTINELS)],
+    )
+    return ReducedModel(
+        full.rest,
+        basis,
+        some_points(few, chosen.points, chosen.factors),
+        reduced_surface(mesh, surface, basis[:, :, :count]),
+        np.tensordot(full.weights, basis, 2),
+        full.cushion,
+        estimate,
+    )
+
+
+def _cubature(
+    points: ElasticPoints, states: FloatArray, stiffness: FloatArray, most: int, tolerance: float
+) -> Cubature:
+    """Points that make the forces of all at the states (s, r).
+
+    Forces count by the displacement that they make, as a share of the state's. The equations, r for each state, are
+    as many random mixtures of themselves as choosing needs.
+    """
+    random = np.random.default_rng(0)
+    factor = cho_factor(stiffness)
+    rows = min(states.size, _EQUATIONS * most)
+    mixed = np.zeros((rows, len(points.weights)))
+    for state in states:
+        forces = np.einsum("pk,pkr->rp", points.stresses(state), points.strains)
+        made = cho_solve(factor, forces) / np.linalg.norm(state)
+        mixed += random.normal(size=(rows, len(state))) @ made
+    return choose_points(mixed, tolerance, most)
+
+
+def _spread(places: FloatArray, nodes: IntArray, count: int) -> IntArray:
+    """Up to `count` of the nodes, each as far from those before as can be."""
+    chosen = [int(nodes[0])]
+    away = np.linalg.norm(places[nodes] - places[chosen[0]], axis=1)
+    while len(chosen) < min(count, len(nodes)):
+        chosen.append(int(nodes[away.argmax()]))
+        away = np.minimum(away, np.linalg.norm(places[nodes] - places[chosen[-1]], axis=1))
+    return np.array(chosen)
