@@ -1,5 +1,6 @@
 """Makes a reduced model from full solutions."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,13 +10,16 @@ from glisson.core.arrays import FloatArray, IntArray
 from glisson.mechanics.reduced.basis import modes
 from glisson.mechanics.reduced.contact import reduced_surface
 from glisson.mechanics.reduced.cubature import Cubature, choose_points
-from glisson.mechanics.reduced.estimate import ErrorEstimate
+from glisson.mechanics.reduced.estimate import ErrorEstimate, with_tangent
 from glisson.mechanics.reduced.full import FullModel
+from glisson.mechanics.reduced.local import local_compliance
 from glisson.mechanics.reduced.model import ReducedModel
 from glisson.mechanics.reduced.points import ElasticPoints, elastic_points, some_points
 
+_STATES = 250  # at which forces are compared, at most
+_LEAST = 1e-5  # eigenvalue of a stiffness, as a share of its largest
 _SENTINELS = 200
-_EQUATIONS = 3  # mixed ones for each point that may be chosen
+_EQUATIONS = 6  # mixed ones for each point that may be chosen
 
 
 @dataclass(frozen=True)
@@ -29,20 +33,29 @@ class Sizes:
     tolerance: float = 3e-4
 
 
-def build_reduced(full: FullModel, displacements: FloatArray, sizes: Sizes) -> ReducedModel:
-    """A reduced model, its estimate not calibrated yet, from displacements (s, n, 3) of full solutions in mm."""
+def build_reduced(full: FullModel, displacements: FloatArray, reach: IntArray, sizes: Sizes) -> ReducedModel:
+    """A reduced model, its estimate not calibrated yet.
+
+    Args:
+        full: what is reduced.
+        displacements: (s, n, 3) of full solutions, in mm.
+        reach: (k,) the nodes of the surface that tools may touch.
+        sizes: of the reduced model.
+    """
     basis = modes(displacements, sizes.estimate_unknowns)
     count = min(sizes.unknowns, basis.shape[2])
     every = elastic_points(full.model.mesh, full.model.materials, basis)
     states = np.tensordot(displacements, basis, 2)
     stiffness = every.stiffness(np.zeros(basis.shape[2]), project=False)
     few = ElasticPoints(np.ascontiguousarray(every.strains[:, :, :count]), every.weights, every.regions, every.materials)
-    chosen = _cubature(few, states[:, :count], stiffness[:count, :count], sizes.points, sizes.tolerance)
-    estimating = _cubature(every, states, stiffness, sizes.estimate_points, sizes.tolerance)
+    some = states[np.random.default_rng(0).permutation(len(states))[:_STATES]]
+    tangents = [few.stiffness(state[:count], project=False) for state in some]
+    chosen = _cubature(few, some[:, :count], tangents, sizes.points, sizes.tolerance)
+    in_all = [with_tangent(stiffness, tangent) for tangent in tangents]
+    estimating = _cubature(every, some, in_all, sizes.estimate_points, sizes.tolerance)
     mesh, surface = full.model.mesh, full.surface
     estimate = ErrorEstimate(
         some_points(every, estimating.points, estimating.factors),
-        reduced_surface(mesh, surface, basis),
         stiffness,
         basis[_spread(mesh.nodes, np.unique(surface.nodes), _SENTINELS)],
     )
@@ -50,7 +63,8 @@ def build_reduced(full: FullModel, displacements: FloatArray, sizes: Sizes) -> R
         full.rest,
         basis,
         some_points(few, chosen.points, chosen.factors),
-        reduced_surface(mesh, surface, basis[:, :, :count]),
+        reduced_surface(mesh, surface, basis, reach),
+        local_compliance(full, reach, basis[:, :, :count]),
         np.tensordot(full.weights, basis, 2),
         full.cushion,
         estimate,
@@ -58,22 +72,29 @@ def build_reduced(full: FullModel, displacements: FloatArray, sizes: Sizes) -> R
 
 
 def _cubature(
-    points: ElasticPoints, states: FloatArray, stiffness: FloatArray, most: int, tolerance: float
+    points: ElasticPoints, states: FloatArray, tangents: Sequence[FloatArray], most: int, tolerance: float
 ) -> Cubature:
-    """Points that make the forces of all at the states (s, r).
+    """Points that make the forces of all at the states (s, r), whose stiffness (r, r) is that of `tangents`.
 
-    Forces count by the displacement that they make, as a share of the state's. The equations, r for each state, are
-    as many random mixtures of themselves as choosing needs.
+    Forces count by the displacement that they make there, as a share of the state's. The equations, r for each state, are
+    summed with random signs to as many as choosing needs.
     """
     random = np.random.default_rng(0)
-    factor = cho_factor(stiffness)
     rows = min(states.size, _EQUATIONS * most)
     mixed = np.zeros((rows, len(points.weights)))
-    for state in states:
+    for state, tangent in zip(states, tangents, strict=True):
         forces = np.einsum("pk,pkr->rp", points.stresses(state), points.strains)
-        made = cho_solve(factor, forces) / np.linalg.norm(state)
-        mixed += random.normal(size=(rows, len(state))) @ made
+        made = cho_solve(cho_factor(_definite(tangent)), forces) / np.linalg.norm(state)
+        into = random.choice(rows, len(state), replace=False)
+        mixed[into] += random.choice([-1.0, 1.0], len(state))[:, None] * made
     return choose_points(mixed, tolerance, most)
+
+
+def _definite(matrix: FloatArray) -> FloatArray:
+    """The matrix with its least eigenvalues raised: what buckles without its tool is still stiff with it."""
+    values, vectors = np.linalg.eigh(matrix)
+    result: FloatArray = (vectors * np.maximum(values, _LEAST * values[-1])) @ vectors.T
+    return result
 
 
 def _spread(places: FloatArray, nodes: IntArray, count: int) -> IntArray:

@@ -7,7 +7,7 @@ from scipy.linalg import solve_triangular
 
 from glisson.core.arrays import FloatArray, IntArray
 
-_BLOCK = 8  # points that enter at once, as long as many are missing
+_BLOCK, _SHARE = 8, 0.1  # points that enter at once, or more as a share of those that have
 _PASSES = 2000
 
 
@@ -36,8 +36,9 @@ def choose_points(contributions: FloatArray, tolerance: float, most: int) -> Cub
             break
         gain = left @ contributions
         gain[chosen] = -np.inf
-        chosen = np.concatenate([chosen, np.argsort(gain)[-_BLOCK:]])
-        factors = np.concatenate([factors, np.zeros(_BLOCK)])
+        entering = np.argsort(gain)[-max(_BLOCK, int(_SHARE * len(chosen))) :]
+        chosen = np.concatenate([chosen, entering])
+        factors = np.concatenate([factors, np.zeros(len(entering))])
         chosen, factors = _least_squares(contributions, goal, chosen, factors)
         left = goal - contributions[:, chosen] @ factors
     return Cubature(chosen, factors, float(np.linalg.norm(left)) / size)

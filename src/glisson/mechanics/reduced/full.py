@@ -16,7 +16,7 @@ from glisson.mechanics.linear_solvers import make_direct_solver
 from glisson.mechanics.loads import fixed_unknowns, gravity_forces
 from glisson.mechanics.pattern import FreeSystem, Stiffness, block_pattern, pair_slots
 from glisson.mechanics.reduced.load import Load
-from glisson.mechanics.reduced.minimise import Minimum, minimise
+from glisson.mechanics.reduced.minimise import Minimum, minimise, rounding_uj
 from glisson.mechanics.reduced.pressing import Pressing
 
 TOLERANCE = 1e-7
@@ -47,6 +47,7 @@ class FullModel:
         self.system = FreeSystem(self.pattern, self.fixed)
         self.pairs = pair_slots(self.pattern, self.surface.nodes)
         self.solver = make_direct_solver()
+        self.volume_mm3 = mesh.volume_mm3
 
     def dead_forces(self, load: Load) -> FloatArray:
         """Nodal forces (n, 3) in mN of a load without its tool."""
@@ -55,7 +56,7 @@ class FullModel:
         return forces
 
     def solve(self, load: Load, start: FloatArray | None = None) -> FloatArray:
-        """Positions (n, 3) in equilibrium; without a `start` (n, 3) the load comes on in steps, from rest.
+        """Positions (n, 3) in equilibrium, found from a `start` (n, 3) or, where that fails, from rest.
 
         Raises:
             StageFailed: no equilibrium was found.
@@ -64,17 +65,26 @@ class FullModel:
             found = self._minimum(load, start)
             if found.converged:
                 return found.unknowns
-        positions, share, step = self.rest, 0.0, 1.0 / _STEPS
+        return self.path(load)[-1]
+
+    def path(self, load: Load) -> list[FloatArray]:
+        """Positions (n, 3) in equilibrium on the way from rest, as the load comes on in steps; the last is its end.
+
+        Raises:
+            StageFailed: no equilibrium was found.
+        """
+        found, share, step = [self.rest], 0.0, 1.0 / _STEPS
         while share < 1.0:
             ahead = min(share + step, 1.0)
-            found = self._minimum(load.part(ahead), positions)
-            if found.converged:
-                positions, share = found.unknowns, ahead
+            answer = self._minimum(load.part(ahead), found[-1])
+            if answer.converged:
+                found.append(answer.unknowns)
+                share = ahead
                 continue
             step *= 0.5
             if step < _SHORTEST:
                 raise StageFailed("The full model found no equilibrium under a load.", Status.STAGNATED)
-        return positions
+        return found[1:]
 
     def _minimum(self, load: Load, start: FloatArray) -> Minimum:
         return minimise(FullPotential(self, load), start, TOLERANCE, _LIMIT)
@@ -87,6 +97,7 @@ class FullPotential:
         self._full = full
         self._forces = full.dead_forces(load)
         self._pressing = Pressing.of(load, full.cushion)
+        self.rounding = rounding_uj(full.elasticity.softest_kpa, full.volume_mm3)
 
     def energy(self, positions: FloatArray) -> float:
         """In µJ."""

@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from glisson.core.arrays import FloatArray
 from glisson.mechanics.reduced.full import FullModel
 from glisson.mechanics.reduced.load import Load
@@ -34,7 +32,7 @@ class LiveModel:
 
     def reset(self) -> None:
         """Go back to rest."""
-        self._modal = np.zeros(self._reduced.size)
+        self._before = self._state = self._reduced.at_rest
 
     def update(self, load: Load) -> Update:
         """The organ under a load that is not far from the last one.
@@ -43,13 +41,15 @@ class LiveModel:
             StageFailed: the full model had to answer and found no equilibrium.
         """
         reduced = self._reduced
-        found = reduced.solve(load, self._modal)
-        positions = reduced.positions(found.unknowns)
-        bound = reduced.bound_mm(load, found.unknowns) if found.converged else float("inf")
+        for start in (self._state.beyond(self._before), self._state):
+            answer = reduced.solve(load, start)
+            if answer.converged:
+                break
+        bound = reduced.bound_mm(load, answer) if answer.converged else float("inf")
+        self._before = self._state
         if bound <= self._largest_mm:
-            self._modal = found.unknowns
-            return Update(positions, bound, False)
-        start = positions if found.converged else reduced.positions(self._modal)
-        positions = self._full.solve(load, start)
-        self._modal = reduced.modal(positions)
+            self._state = answer.state
+            return Update(reduced.positions(answer), bound, False)
+        positions = self._full.solve(load, reduced.positions(answer))
+        self._before = self._state = reduced.state(positions)
         return Update(positions, 0.0, True)

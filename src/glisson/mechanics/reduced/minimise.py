@@ -9,11 +9,20 @@ from glisson.core.arrays import FloatArray
 
 _ARMIJO = 1e-4
 _HALVINGS = 30
-_ROUND_OFF = 1e-12  # share of the energy that rounding may take
+_ROUND_OFF = 1e-12  # share of the energy that rounding may take, …
+_STRAIN_ROUND_OFF = 1e-15  # … and of Young's modulus times volume, in strain energies that are small differences
+
+
+def rounding_uj(young_modulus_kpa: float, volume_mm3: float) -> float:
+    """By how much strain energies are uncertain in µJ, by rounding alone."""
+    return _STRAIN_ROUND_OFF * young_modulus_kpa * volume_mm3
 
 
 class Potential(Protocol):
     """An energy over unknowns (of any shape) with its derivatives."""
+
+    rounding: float
+    """By how much energies are uncertain, in µJ."""
 
     def energy(self, unknowns: FloatArray) -> float:
         """In µJ; infinite where an element is inverted."""
@@ -52,11 +61,12 @@ def minimise(potential: Potential, start: FloatArray, tolerance: float, limit: i
         slope = float(np.vdot(gradient, step))
         share = 1.0
         for _ in range(_HALVINGS):
-            reached = potential.energy(unknowns + share * step)
-            if reached <= energy + _ARMIJO * share * slope + _ROUND_OFF * abs(energy):
+            moved = unknowns + share * step
+            reached = potential.energy(moved)
+            if reached <= energy + _ARMIJO * share * slope + _ROUND_OFF * abs(energy) + potential.rounding:
                 break
             share *= 0.5
         else:
             break
-        unknowns, energy = unknowns + share * step, reached
+        unknowns, energy = moved, reached
     return Minimum(unknowns, iteration, residual, False)

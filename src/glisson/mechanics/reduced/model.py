@@ -1,6 +1,7 @@
 """The reduced model: modes, the elements that count, the surface in the modes, and its error estimate."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -9,7 +10,8 @@ from glisson.mechanics.contact_law import Cushion
 from glisson.mechanics.reduced.contact import ReducedContact, ReducedSurface
 from glisson.mechanics.reduced.estimate import ErrorEstimate
 from glisson.mechanics.reduced.load import Load
-from glisson.mechanics.reduced.minimise import Minimum, minimise
+from glisson.mechanics.reduced.local import LocalCompliance, turn_of
+from glisson.mechanics.reduced.minimise import minimise
 from glisson.mechanics.reduced.points import ElasticPoints
 from glisson.mechanics.reduced.potential import ReducedPotential
 
@@ -18,14 +20,41 @@ _LIMIT = 40
 
 
 @dataclass(frozen=True, eq=False)
+class State:
+    """Modal displacements (r,), and the tool's forces (k, 3) in mN on nodes it reaches, which have turned by `turn`."""
+
+    modal: FloatArray
+    forces: FloatArray
+    turn: FloatArray
+
+    def beyond(self, before: "State") -> "State":
+        """Where the organ would be next if it went on as it came from the state before."""
+        return State(2.0 * self.modal - before.modal, 2.0 * self.forces - before.forces, self.turn)
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """The state in equilibrium, if it has `converged`, pulls (k, 3) on nodes that tools reach, and the contact."""
+
+    state: State
+    pulls: FloatArray
+    unknowns: FloatArray
+    tangent: FloatArray
+    contact: ReducedContact | None
+    iterations: int
+    converged: bool
+
+
+@dataclass(frozen=True, eq=False)
 class ReducedModel:
-    """An organ of r unknowns.
+    """An organ of r unknowns, and of some more next to a tool.
 
     Args:
         rest: (n, 3) node positions in mm without stress.
         basis: (n, 3, R) modes; the first r are the unknowns, the others only estimate the error.
         points: where the elastic energy is taken, strained by the r modes.
-        surface: in the r modes.
+        surface: in the R modes.
+        local: how the surface gives way beyond the r modes.
         weights: (3, R) the organ's weight along each axis, on the modes, in mN.
         cushion: between organ and tools.
         estimate: of the error.
@@ -35,42 +64,77 @@ class ReducedModel:
     basis: FloatArray
     points: ElasticPoints
     surface: ReducedSurface
+    local: LocalCompliance
     weights: FloatArray
     cushion: Cushion
     estimate: ErrorEstimate
 
+    @cached_property
+    def _few(self) -> ReducedSurface:
+        return self.surface.in_modes(self.size)
+
+    @cached_property
+    def _fields(self) -> FloatArray:
+        return np.ascontiguousarray(self.basis[:, :, : self.size])
+
     @property
     def size(self) -> int:
-        """The number of unknowns r."""
+        """The number of modal unknowns r."""
         return self.points.strains.shape[2]
+
+    @property
+    def at_rest(self) -> State:
+        """The state without a load."""
+        return State(np.zeros(self.size), np.zeros((len(self.local.nodes), 3)), np.eye(3))
 
     def dead_forces(self, load: Load) -> FloatArray:
         """Forces (R,) on all modes of a load without its tool."""
-        of_nodes = np.einsum("ki,kir->r", load.forces, self.basis[load.nodes])
-        result: FloatArray = load.weight @ self.weights + of_nodes
+        result: FloatArray = load.weight @ self.weights + self._pull(load)
         return result
 
-    def solve(self, load: Load, start: FloatArray | None = None) -> Minimum:
-        """Modal displacements (r,) in equilibrium, from a state (r,) nearby or from rest."""
-        start = np.zeros(self.size) if start is None else start
-        contact = None if load.tool is None else ReducedContact(self.surface, load, self.cushion, start)
-        potential = ReducedPotential(self.points, self.dead_forces(load)[: self.size], contact)
-        return minimise(potential, start, _TOLERANCE, _LIMIT)
+    def _pull(self, load: Load) -> FloatArray:
+        result: FloatArray = np.tensordot(load.forces, self.basis[load.nodes], 2)
+        return result
 
-    def raw_error_mm(self, load: Load, modal: FloatArray) -> float:
+    def solve(self, load: Load, start: State | None = None) -> Answer:
+        """Equilibrium, looked for from a state nearby or from rest."""
+        start = start or self.at_rest
+        dead = self.dead_forces(load)[: self.size]
+        pulls = self.local.on_nodes(load.nodes, load.forces)
+        contact, unknowns = None, start.modal
+        if load.tool is not None:
+            contact = ReducedContact(self._few, self.local, load, self.cushion, start.modal, pulls)
+            pushes = np.einsum("ci,ci->c", start.forces[contact.pushed], contact.normals)
+            unknowns = np.concatenate([start.modal, pushes])
+        potential = ReducedPotential(self.points, dead, contact)
+        found = minimise(potential, unknowns, _TOLERANCE, _LIMIT)
+        modal, forces = found.unknowns[: self.size], np.zeros_like(start.forces)
+        if contact is None:
+            loaded = self.rest[load.nodes]
+            turn = turn_of(loaded, loaded + self._fields[load.nodes] @ modal)
+        else:
+            turn = contact.turn
+            forces[contact.pushed] = found.unknowns[self.size :, None] * contact.normals
+        state, tangent = State(modal, forces, turn), potential.tangent(found.unknowns)
+        return Answer(state, pulls, found.unknowns, tangent, contact, found.iterations, found.converged)
+
+    def raw_error_mm(self, load: Load, answer: Answer) -> float:
         """The estimate before its factor."""
-        return self.estimate.raw_mm(modal, self.dead_forces(load), load, self.cushion)
+        pull = self._pull(load)[: self.size]
+        weight = load.weight @ self.weights
+        return self.estimate.raw_mm(answer.unknowns, answer.tangent, weight, pull, answer.contact, self.surface)
 
-    def bound_mm(self, load: Load, modal: FloatArray) -> float:
+    def bound_mm(self, load: Load, answer: Answer) -> float:
         """What no node is farther from the full model's answer, by all that calibration saw."""
-        return self.estimate.bound_mm(self.raw_error_mm(load, modal))
+        return self.estimate.bound_mm(self.raw_error_mm(load, answer))
 
-    def positions(self, modal: FloatArray) -> FloatArray:
+    def positions(self, answer: Answer) -> FloatArray:
         """Node positions (n, 3) in mm."""
-        result: FloatArray = self.rest + self.basis[:, :, : self.size] @ modal
-        return result
+        state = answer.state
+        modal: FloatArray = self.rest + self._fields @ state.modal
+        return modal + self.local.displacement(state.forces + answer.pulls, state.turn)
 
-    def modal(self, positions: FloatArray) -> FloatArray:
-        """The state (r,) next to node positions (n, 3)."""
-        result: FloatArray = np.tensordot(positions - self.rest, self.basis[:, :, : self.size], 2)
-        return result
+    def state(self, positions: FloatArray) -> State:
+        """The state without a tool next to node positions (n, 3)."""
+        rest = self.at_rest
+        return State(np.tensordot(positions - self.rest, self._fields, 2), rest.forces, rest.turn)

@@ -13,6 +13,7 @@ from glisson.geometry.compiled import compiled
 from glisson.mechanics.elasticity import cut_negative
 from glisson.mechanics.elements import quadrature
 from glisson.mechanics.materials.law import law_of
+from glisson.mechanics.reduced.minimise import rounding_uj
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +41,11 @@ class ElasticPoints:
     @cached_property
     def _flat(self) -> FloatArray:
         return np.ascontiguousarray(self.strains.reshape(-1, self.strains.shape[2]))
+
+    @cached_property
+    def rounding_uj(self) -> float:
+        """By how much energies are uncertain, by rounding alone."""
+        return sum(rounding_uj(m.young_modulus_kpa, float(self.weights[run].sum())) for run, m in self._runs)
 
     def gradients(self, modal: FloatArray) -> FloatArray:
         """Deformation gradients (m, 3, 3) at modal displacements (r,)."""

@@ -7,9 +7,11 @@ from glisson.core.arrays import FloatArray
 from glisson.mechanics.reduced.contact import ReducedContact
 from glisson.mechanics.reduced.points import ElasticPoints
 
+_WHOLE_MM = 100.0  # a displacement that counts as much as the largest force
+
 
 class ReducedPotential:
-    """Energy, gradient and Newton's step over modal displacements (r,).
+    """Energy, gradient and Newton's step over the unknowns (r + c,): modal displacements, and pushes of a tool.
 
     Args:
         points: where the elastic energy is taken.
@@ -19,43 +21,69 @@ class ReducedPotential:
 
     def __init__(self, points: ElasticPoints, dead: FloatArray, contact: ReducedContact | None) -> None:
         self._points, self._dead, self._contact = points, dead, contact
+        self._size = len(dead)
+        self._scale = 0.0
+        self._tangent: FloatArray | None = None
+        self.rounding = points.rounding_uj
 
-    def energy(self, modal: FloatArray) -> float:
+    def energy(self, unknowns: FloatArray) -> float:
         """In µJ; infinite where a chosen element is inverted."""
+        modal, pushes = unknowns[: self._size], unknowns[self._size :]
         energy = self._points.energy(modal) - float(self._dead @ modal)
         if self._contact is not None and np.isfinite(energy):
-            energy += self._contact.energy(modal)
+            energy += self._contact.energy(unknowns) + 0.5 * float(pushes @ self._contact.compliance @ pushes)
         return energy
 
-    def gradient(self, modal: FloatArray) -> FloatArray:
-        """What is unbalanced (r,)."""
-        gradient = self._points.forces(modal) - self._dead
+    def gradient(self, unknowns: FloatArray) -> FloatArray:
+        """What is unbalanced: forces in mN on the modes, and displacements in mm along the pushes."""
+        gradient = np.zeros_like(unknowns)
+        elastic = self._points.forces(unknowns[: self._size])
+        self._scale = max(float(np.linalg.norm(elastic)), float(np.linalg.norm(self._dead)))
+        gradient[: self._size] = elastic - self._dead
         if self._contact is not None:
-            gradient -= self._contact.forces(modal)
+            gradient[self._size :] = self._contact.compliance @ unknowns[self._size :]
+            gradient -= self._contact.forces(unknowns)
         return gradient
 
-    def step(self, modal: FloatArray, gradient: FloatArray) -> FloatArray:
-        """Newton's step (r,); the exact stiffness where it is positive definite."""
-        try:
-            return self._solved(modal, gradient, project=False)
-        except np.linalg.LinAlgError:
-            return self._solved(modal, gradient, project=True)
+    def step(self, unknowns: FloatArray, gradient: FloatArray) -> FloatArray:
+        """Newton's step; the exact stiffness where it is positive definite."""
+        modal = unknowns[: self._size]
+        elastic = self._tangent = self._points.stiffness(modal, project=False)
+        for project in (False, True):
+            try:
+                return _solved(self._completed(elastic, unknowns, project), gradient)
+            except np.linalg.LinAlgError:
+                continue
+        return _solved(self._completed(self._points.stiffness(modal, project=True), unknowns, True), gradient)
 
-    def _solved(self, modal: FloatArray, gradient: FloatArray, project: bool) -> FloatArray:
-        matrix = self.stiffness(modal, project)
-        factor = cho_factor(matrix, overwrite_a=True, check_finite=False)
-        step: FloatArray = cho_solve(factor, -gradient, check_finite=False)
-        return step
+    def tangent(self, unknowns: FloatArray) -> FloatArray:
+        """The elastic stiffness (r, r) of the last step, or here if none was needed."""
+        return self._points.stiffness(unknowns[: self._size], project=False) if self._tangent is None else self._tangent
 
-    def stiffness(self, modal: FloatArray, project: bool) -> FloatArray:
-        """∂²/∂q² (r, r)."""
-        matrix = self._points.stiffness(modal, project)
-        if self._contact is not None:
-            matrix += self._contact.stiffness(modal, project)
-        return matrix
+    def stiffness(self, unknowns: FloatArray) -> FloatArray:
+        """The second derivatives."""
+        return self._completed(self._points.stiffness(unknowns[: self._size], project=False), unknowns, False)
 
-    def residual(self, modal: FloatArray, gradient: FloatArray) -> float:
-        """Unbalanced force over the largest of the dead and the internal ones."""
-        internal = gradient + self._dead
-        scale = max(float(np.linalg.norm(self._dead)), float(np.linalg.norm(internal)))
-        return float(np.linalg.norm(gradient)) / scale if scale > 0.0 else 0.0
+    def _completed(self, elastic: FloatArray, unknowns: FloatArray, project: bool) -> FloatArray:
+        return elastic if self._contact is None else with_contact(elastic, self._contact, unknowns, project)
+
+    def residual(self, unknowns: FloatArray, gradient: FloatArray) -> float:
+        """Unbalanced force on the modes, over the larger of the dead and the elastic ones; pushes count by mm."""
+        on_modes = float(np.linalg.norm(gradient[: self._size]))
+        apart = float(np.abs(gradient[self._size :]).max(initial=0.0)) / _WHOLE_MM
+        return max(on_modes / self._scale if self._scale > 0.0 else 0.0, apart)
+
+
+def _solved(matrix: FloatArray, gradient: FloatArray) -> FloatArray:
+    factor = cho_factor(matrix, check_finite=False)
+    step: FloatArray = cho_solve(factor, -gradient, check_finite=False)
+    return step
+
+
+def with_contact(elastic: FloatArray, contact: ReducedContact, unknowns: FloatArray, project: bool) -> FloatArray:
+    """The stiffness of modes (r, r), and a tool's contact with them and with the pushes: (r + c, r + c)."""
+    size = len(elastic)
+    matrix = contact.stiffness(unknowns, project)
+    matrix[:size, :size] += elastic
+    matrix[size:, size:] += contact.compliance
+    return matrix

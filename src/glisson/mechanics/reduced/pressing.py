@@ -39,6 +39,10 @@ class Pressing:
         """Numbers of the points that it presses on."""
         return np.flatnonzero(gaps < self.cushion.range_mm)
 
+    def normals(self, points: FloatArray) -> FloatArray:
+        """Its outward normals (p, 3) at points (p, 3)."""
+        return self._derivatives(points)[0]
+
     def pushes(self, points: FloatArray, gaps: FloatArray, areas: FloatArray) -> FloatArray:
         """Forces (p, 3) in mN on points (p, 3)."""
         normals, _ = self._derivatives(points)

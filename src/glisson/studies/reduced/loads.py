@@ -17,11 +17,12 @@ from glisson.studies.reduced.liver import TIP
 
 _WEIGHT = 0.02  # largest share of the weight
 _REACH = 0.5  # of the organ's length from its tip, where graspers and bars get
-_GRASP_MM = (10.0, 20.0)  # standard deviation of a grasper's pull over the surface
-_PULL_MN = (15.0, 250.0)
-_RADIUS_MM = (8.0, 14.0)
+_GRASP_MM = (12.0, 20.0)  # standard deviation of a grasper's pull over the surface
+_PULL_MN = (15.0, 150.0)
+_RADIUS_MM = (10.0, 15.0)
 _DEPTH_MM = (4.0, 30.0)  # of a bar's tip under where the surface was
 _CLEAR_MM = 2.0
+_BESIDE_MM = 10.0  # by which a bar may slide
 _SLANT = 0.5  # tangent of the bar's angle to the surface's normal, standard deviation
 _SHAFT_MM = 150.0
 
@@ -44,6 +45,15 @@ class Draw:
             return Load(weight, nodes, forces)
         tool, approach = self._bar(random)
         return Load(weight, nodes, forces, tool, approach)
+
+    @property
+    def reach(self) -> IntArray:
+        """Surface nodes that a bar may touch."""
+        mesh = self.model.mesh
+        surface = np.unique(mesh.boundary()[0])
+        away = np.linalg.norm(mesh.nodes[surface] - mesh.nodes[self.model.node_set(TIP)[0]], axis=1)
+        found: IntArray = surface[away < _REACH * np.ptp(mesh.nodes, axis=0).max() + _RADIUS_MM[1] + _BESIDE_MM]
+        return found
 
     def _grasp(self, random: np.random.Generator) -> tuple[IntArray, FloatArray]:
         places, surface, _ = self._surface()
