@@ -21,11 +21,12 @@ from glisson.mechanics.reduced.estimate import ErrorEstimate
 from glisson.mechanics.reduced.full import FullModel
 from glisson.mechanics.reduced.live import LiveModel
 from glisson.mechanics.reduced.load import Load
+from glisson.mechanics.reduced.local import local_compliance
 from glisson.mechanics.reduced.model import ReducedModel
 from glisson.mechanics.reduced.packing import KIND, SCHEMA, pack, unpack
 from glisson.mechanics.reduced.points import elastic_points
 from glisson.mechanics.reduced.potential import ReducedPotential
-from glisson.mechanics.reduced.training import from_reduced, from_rest
+from glisson.mechanics.reduced.training import from_reduced, from_rest, taken_on
 
 MATERIAL = Material("neo-hookean-log", 6.0, 0.45, 1150.0)
 
@@ -53,6 +54,14 @@ def drawn(full: FullModel, number: int, pull_mn: float = 12.0) -> Load:
     return Load(weight, far, forces, tool, np.array([0.0, 0.0, -depth - 2.0]))
 
 
+def reach_of(full: FullModel) -> np.ndarray:
+    """Nodes on the surface's far half."""
+    surface = np.unique(full.model.mesh.boundary()[0])
+    return surface[
+        np.linalg.norm(full.rest[surface] - full.rest[full.model.node_set("far")].mean(axis=0), axis=1) < 50.0
+    ]
+
+
 @pytest.fixture(scope="module")
 def full() -> FullModel:
     return FullModel(bar_model(), ("held",))
@@ -61,7 +70,7 @@ def full() -> FullModel:
 @pytest.fixture(scope="module")
 def reduced(full: FullModel) -> ReducedModel:
     displacements = from_rest(full, [drawn(full, number) for number in range(30)])
-    model = build_reduced(full, displacements, Sizes(16, 80, 32, 150, 1e-4))
+    model = build_reduced(full, displacements, reach_of(full), Sizes(16, 80, 32, 150, 1e-4))
     loads = [drawn(full, number) for number in range(100, 120)]
     numbers, truths = from_reduced(full, model, loads)
     raw, errors = judged(full, model, [loads[n] for n in numbers], truths)
@@ -72,9 +81,9 @@ def judged(full, model, loads, truths):
     """Raw estimates and true errors (mm) of reduced answers."""
     raw, errors = [], []
     for load, truth in zip(loads, truths, strict=True):
-        modal = model.solve(load, model.modal(full.rest + truth)).unknowns
-        raw.append(model.raw_error_mm(load, modal))
-        errors.append(np.linalg.norm(model.positions(modal) - full.rest - truth, axis=1).max())
+        answer = model.solve(load, model.state(full.rest + truth))
+        raw.append(model.raw_error_mm(load, answer))
+        errors.append(np.linalg.norm(model.positions(answer) - full.rest - truth, axis=1).max())
     return np.array(raw), np.array(errors)
 
 
@@ -84,34 +93,56 @@ def test_all_modes_and_all_points_give_the_full_answer(full: FullModel) -> None:
     basis[free, np.arange(len(free))] = 1.0
     basis = basis.reshape(*full.fixed.shape, len(free))
     points = elastic_points(full.model.mesh, full.model.materials, basis)
-    surface = reduced_surface(full.model.mesh, full.surface, basis)
-    estimate = ErrorEstimate(points, surface, np.eye(len(free)), basis[:1])
+    surface = reduced_surface(full.model.mesh, full.surface, basis, reach_of(full))
+    local = local_compliance(full, reach_of(full), basis)
+    assert np.abs(local.fields).max() < 1e-5  # nothing is left for it
+    estimate = ErrorEstimate(points, np.eye(len(free)), basis[:1])
     weights = np.tensordot(full.weights, basis, 2)
-    model = ReducedModel(full.rest, basis, points, surface, weights, full.cushion, estimate)
+    model = ReducedModel(full.rest, basis, points, surface, local, weights, full.cushion, estimate)
     load = drawn(full, 1)
-    modal = np.zeros(model.size)
-    for share in (0.5, 1.0):
-        modal = model.solve(load.part(share), modal).unknowns
+    answer = taken_on(model, load)
     moved = np.abs(full.solve(load) - full.rest).max()
     assert moved > 3.0
-    assert np.abs(model.positions(modal) - full.solve(load)).max() < 1e-4 * moved
+    assert np.abs(model.positions(answer) - full.solve(load)).max() < 1e-4 * moved
+
+
+def test_with_its_local_compliance_any_mode_answers_as_the_full_linear_model(full: FullModel) -> None:
+    # A faint pull on one node: the mode has nothing of it but for its own share.
+    basis = modes(from_rest(full, [drawn(full, 0)]), 1)
+    node = int(reach_of(full)[7])
+    load = Load(np.zeros(3), np.array([node]), np.array([[0.001, 0.002, -0.001]]))
+    points = elastic_points(full.model.mesh, full.model.materials, basis)
+    surface = reduced_surface(full.model.mesh, full.surface, basis, reach_of(full))
+    local = local_compliance(full, reach_of(full), basis)
+    weights = np.tensordot(full.weights, basis, 2)
+    estimate = ErrorEstimate(points, np.eye(1), basis[:1])
+    model = ReducedModel(full.rest, basis, points, surface, local, weights, full.cushion, estimate)
+    truth = full.solve(load) - full.rest
+    assert np.abs(model.positions(model.solve(load)) - full.rest - truth).max() < 1e-3 * np.abs(truth).max()
 
 
 def test_forces_and_stiffness_are_derivatives_of_the_energy(full: FullModel, reduced: ReducedModel) -> None:
     load = drawn(full, 1)
-    modal = reduced.solve(load.part(0.5)).unknowns
-    contact = ReducedContact(reduced.surface, load, reduced.cushion, modal)
-    assert contact.energy(modal) > 0.0
+    start = reduced.solve(load.part(0.9))
+    pulls = reduced.local.on_nodes(load.nodes, load.forces)
+    contact = ReducedContact(
+        reduced.surface.in_modes(reduced.size), reduced.local, load, reduced.cushion, start.state.modal, pulls
+    )
+    random = np.random.default_rng(1)
+    unknowns = np.concatenate([start.state.modal, random.uniform(0.5, 2.0, len(contact.pushed))])
+    assert len(contact.pushed) > 0
+    assert contact.energy(unknowns) > 0.0
     potential = ReducedPotential(reduced.points, reduced.dead_forces(load)[: reduced.size], contact)
-    across = np.random.default_rng(1).normal(size=reduced.size)
+    across = random.normal(size=len(unknowns))
     remainders = []
     for step in (1e-2, 5e-3):
-        slope = potential.energy(modal + step * across) - potential.energy(modal - step * across)
-        change = potential.gradient(modal + step * across) - potential.gradient(modal - step * across)
+        ahead, behind = unknowns + step * across, unknowns - step * across
+        slope = (potential.energy(ahead) - potential.energy(behind)) / (2.0 * step)
+        change = (potential.gradient(ahead) - potential.gradient(behind)) / (2.0 * step)
         remainders.append(
             (
-                abs(slope / (2.0 * step) - potential.gradient(modal) @ across),
-                np.linalg.norm(change / (2.0 * step) - potential.stiffness(modal, False) @ across),
+                abs(slope - potential.gradient(unknowns) @ across),
+                np.linalg.norm(change - potential.stiffness(unknowns) @ across),
             )
         )
     orders = np.log2(np.array(remainders[0]) / np.array(remainders[1]))
@@ -186,11 +217,11 @@ def test_a_world_that_is_turned_turns_the_answer(full: FullModel, reduced: Reduc
         return Load(turn @ load.weight, load.nodes, load.forces @ turn.T, tool, turn @ load.approach)
 
     trained = from_rest(other, [turned(drawn(full, number)) for number in range(30)])
-    model = build_reduced(other, trained, Sizes(16, 80, 32, 150, 1e-4))
+    model = build_reduced(other, trained, reach_of(full), Sizes(16, 80, 32, 150, 1e-4))
     for number in (400, 401):
         load = drawn(full, number)
-        here = reduced.positions(reduced.solve(load).unknowns)
-        there = model.positions(model.solve(turned(load)).unknowns)
+        here = reduced.positions(taken_on(reduced, load))
+        there = model.positions(taken_on(model, turned(load)))
         assert np.abs(there - (here @ turn.T + shift)).max() < 0.02
 
 
@@ -199,9 +230,11 @@ def test_a_reduced_model_is_written_and_read(full: FullModel, reduced: ReducedMo
     write_arrays(path, KIND, SCHEMA, pack(reduced))
     read = unpack(read_arrays(path, KIND, SCHEMA))
     load = drawn(full, 1)
-    modal = reduced.solve(load).unknowns
-    assert np.array_equal(read.solve(load).unknowns, modal)
-    assert read.bound_mm(load, modal) == reduced.bound_mm(load, modal)
+    answer, again = reduced.solve(load), read.solve(load)
+    assert np.array_equal(again.unknowns, answer.unknowns)
+    assert np.array_equal(read.positions(again), reduced.positions(answer))
+    assert read.raw_error_mm(load, again) == reduced.raw_error_mm(load, answer)
+    assert read.estimate.factor == reduced.estimate.factor
     with pytest.raises(BadInput, match="newer"):
         read_arrays(path, KIND, SCHEMA - 1)
     with pytest.raises(BadInput, match="no template"):

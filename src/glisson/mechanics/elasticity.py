@@ -256,6 +256,7 @@ def _add_block(
 
 @njit(cache=True, nogil=True)
 def cut_negative(tangents: FloatArray) -> None:
+    """Set the negative eigenvalues of tangents (n, 9, 9) to zero, in place."""
     for n in range(len(tangents)):
         values, vectors = np.linalg.eigh(tangents[n])
         if values[0] < 0.0:

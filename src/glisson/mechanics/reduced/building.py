@@ -44,12 +44,16 @@ def build_reduced(full: FullModel, displacements: FloatArray, reach: IntArray, s
     """
     basis = modes(displacements, sizes.estimate_unknowns)
     count = min(sizes.unknowns, basis.shape[2])
+    basis = _uncoupled(full, basis, count)
     every = elastic_points(full.model.mesh, full.model.materials, basis)
-    states = np.tensordot(displacements, basis, 2)
-    stiffness = every.stiffness(np.zeros(basis.shape[2]), project=False)
-    few = ElasticPoints(np.ascontiguousarray(every.strains[:, :, :count]), every.weights, every.regions, every.materials)
+    stiffness = every.stiffness(every.gradients(np.zeros(basis.shape[2])))
+    amounts = np.linalg.lstsq(basis.reshape(-1, basis.shape[2]), displacements.reshape(len(displacements), -1).T)[0]
+    states = np.ascontiguousarray(amounts.T)
+    few = ElasticPoints(
+        np.ascontiguousarray(every.strains[:, :, :count]), every.weights, every.regions, every.materials
+    )
     some = states[np.random.default_rng(0).permutation(len(states))[:_STATES]]
-    tangents = [few.stiffness(state[:count], project=False) for state in some]
+    tangents = [few.stiffness(few.gradients(state[:count])) for state in some]
     chosen = _cubature(few, some[:, :count], tangents, sizes.points, sizes.tolerance)
     in_all = [with_tangent(stiffness, tangent) for tangent in tangents]
     estimating = _cubature(every, some, in_all, sizes.estimate_points, sizes.tolerance)
@@ -71,19 +75,32 @@ def build_reduced(full: FullModel, displacements: FloatArray, reach: IntArray, s
     )
 
 
+def _uncoupled(full: FullModel, basis: FloatArray, count: int) -> FloatArray:
+    """The modes (n, 3, R), those after the first `count` replaced by what these don't answer at rest, of unit length.
+
+    Stiffness at rest then couples both not at all, and any of the first ones can be joined with it.
+    """
+    points = elastic_points(full.model.mesh, full.model.materials, basis)
+    stiffness = points.stiffness(points.gradients(np.zeros(basis.shape[2])))
+    first, others = basis[:, :, :count], basis[:, :, count:]
+    others = others - first @ np.linalg.solve(stiffness[:count, :count], stiffness[:count, count:])
+    others /= np.linalg.norm(others, axis=(0, 1))
+    return np.concatenate([first, others], axis=2)
+
+
 def _cubature(
     points: ElasticPoints, states: FloatArray, tangents: Sequence[FloatArray], most: int, tolerance: float
 ) -> Cubature:
     """Points that make the forces of all at the states (s, r), whose stiffness (r, r) is that of `tangents`.
 
-    Forces count by the displacement that they make there, as a share of the state's. The equations, r for each state, are
-    summed with random signs to as many as choosing needs.
+    Forces count by the displacement that they make there, as a share of the state's. The equations, r for each state,
+    are summed with random signs to as many as choosing needs.
     """
     random = np.random.default_rng(0)
     rows = min(states.size, _EQUATIONS * most)
     mixed = np.zeros((rows, len(points.weights)))
     for state, tangent in zip(states, tangents, strict=True):
-        forces = np.einsum("pk,pkr->rp", points.stresses(state), points.strains)
+        forces = np.einsum("pk,pkr->rp", points.stresses(points.gradients(state)), points.strains)
         made = cho_solve(cho_factor(_definite(tangent)), forces) / np.linalg.norm(state)
         into = random.choice(rows, len(state), replace=False)
         mixed[into] += random.choice([-1.0, 1.0], len(state))[:, None] * made

@@ -16,6 +16,7 @@ from glisson.mechanics.reduced.pressing import Pressing
 
 _REACH_MM = 12.0  # gap within which surface nodes of the last state are candidates …
 _PUSHED_MM = 3.0  # … and within which they may give way beyond the modes
+_LEAST = 1e-8  # compliance in mm/mN, where the modes leave nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +99,7 @@ class ReducedContact:
         self.turn = turn_of(self._rest, places[nodes])
         self.pushed = reached[pushed]
         """Numbers (c,) of the pushed nodes in the local compliance."""
-        self.normals = pressing.normals(places[nodes[pushed]])
+        self.normals, _ = pressing.derivatives(places[nodes[pushed]])
         rows = np.flatnonzero(reached >= 0)
         moved = np.zeros((len(nodes), 3, len(pushed)))
         moved[rows] = _moved(local.compliance, reached[rows], self.pushed, self.normals, self.turn)
@@ -106,7 +107,7 @@ class ReducedContact:
         self._rest[rows] += _shifts(local.compliance, reached[rows], pulled, dead[pulled], self.turn)
         self._moved = moved
         self._basis = np.concatenate([surface.basis[nodes], moved], axis=2)
-        self.compliance = np.einsum("ci,cid->cd", self.normals, moved[pushed])
+        self.compliance = np.einsum("ci,cid->cd", self.normals, moved[pushed]) + _LEAST * np.eye(len(pushed))
         """Of pushes against each other (c, c), in mm/mN."""
         self._last: tuple[FloatArray, _Touching] | None = None
 
@@ -125,7 +126,7 @@ class ReducedContact:
     def forces(self, unknowns: FloatArray) -> FloatArray:
         """Force of the tool on the unknowns (r + c,)."""
         touching = self._touching(unknowns)
-        pushes = self._pressing.pushes(touching.points, touching.gaps, touching.areas)
+        pushes = (touching.areas * self._pressing.cushion.pressure(touching.gaps))[:, None] * touching.normals
         nodal = np.zeros_like(self._rest)
         np.add.at(nodal, touching.nodes, touching.shapes[:, :, None] * pushes[:, None, :])
         used = np.unique(touching.nodes)
@@ -135,7 +136,9 @@ class ReducedContact:
     def stiffness(self, unknowns: FloatArray, project: bool) -> FloatArray:
         """∂² of the energy by the unknowns (r + c, r + c)."""
         touching = self._touching(unknowns)
-        local = self._pressing.stiffness(touching.points, touching.gaps, touching.areas, project)
+        local = self._pressing.stiffness(
+            touching.gaps, touching.areas, touching.normals, None if project else touching.curvatures
+        )
         size = self._basis.shape[2]
         basis = np.einsum("pa,paix->pix", touching.shapes, self._basis[touching.nodes])
         result: FloatArray = basis.reshape(-1, size).T @ (local @ basis).reshape(-1, size)
@@ -154,18 +157,23 @@ class ReducedContact:
         face, kind = np.divmod(pressed, len(self._shapes))
         rows = faces[face]
         areas, shapes = self._areas[rows, kind], self._shapes[kind]
-        touching = _Touching(points[pressed], gaps[pressed], areas, self._faces[rows], shapes)
+        normals, curvatures = self._pressing.derivatives(points[pressed])
+        touching = _Touching(gaps[pressed], areas, normals, curvatures, self._faces[rows], shapes)
         self._last = (unknowns, touching)
         return touching
 
 
 @dataclass(frozen=True, eq=False)
 class _Touching:
-    """Points (p, 3) with gaps (p,) in mm and areas (p,) in mm², the nodes (p, a) of their faces and shape functions."""
+    """Points with gaps (p,) in mm and areas (p,) in mm², the tool's normals (p, 3) and curvatures (p, 3, 3) there.
 
-    points: FloatArray
+    `nodes` (p, a) are those of their faces, with `shapes` (p, a).
+    """
+
     gaps: FloatArray
     areas: FloatArray
+    normals: FloatArray
+    curvatures: FloatArray
     nodes: IntArray
     shapes: FloatArray
 
@@ -184,7 +192,9 @@ def _shifts(compliance: FloatArray, rows: IntArray, pulled: IntArray, dead: Floa
 
 
 @compiled
-def _moved(compliance: FloatArray, rows: IntArray, pushed: IntArray, normals: FloatArray, turn: FloatArray) -> FloatArray:
+def _moved(
+    compliance: FloatArray, rows: IntArray, pushed: IntArray, normals: FloatArray, turn: FloatArray
+) -> FloatArray:
     """Displacements (m, 3, c) of the nodes `rows` (m,) by unit pushes along the normals (c, 3)."""
     moved = np.zeros((len(rows), 3, len(pushed)))
     for d in range(len(pushed)):

@@ -15,7 +15,7 @@ from glisson.mechanics.reduced.points import ElasticPoints
 from glisson.mechanics.reduced.potential import with_contact
 
 _MARGIN = 1.5  # on the largest ratio that calibration saw
-_FLOOR_MM = 0.02  # errors below are not told apart
+_FLOOR_MM = 0.01  # errors below are not told apart
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class ErrorEstimate:
     sentinels: FloatArray
     factor: float = 1.0
 
-    def raw_mm(
+    def modal_mm(
         self,
         unknowns: FloatArray,
         tangent: FloatArray,
@@ -55,7 +55,7 @@ class ErrorEstimate:
         """
         size, modal = len(pull), np.zeros(len(self.stiffness))
         modal[:size] = unknowns[:size]
-        gradient = self.points.forces(modal) - weight
+        gradient = self.points.forces(self.points.gradients(modal)) - weight
         matrix = with_tangent(self.stiffness, tangent)
         right = gradient
         if contact is not None:
@@ -85,7 +85,7 @@ class ErrorEstimate:
 
 
 def with_tangent(stiffness: FloatArray, tangent: FloatArray) -> FloatArray:
-    """The stiffness at rest (R, R) with the present one (r, r) of the first modes, which turn and are soft elsewhere."""
+    """The stiffness at rest (R, R) with the present one (r, r) of the first modes."""
     result = stiffness.copy()
     result[: len(tangent), : len(tangent)] = tangent
     return result

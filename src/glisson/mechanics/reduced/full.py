@@ -1,7 +1,5 @@
 """The full model: every node an unknown. It makes what a reduced model learns from, and is what it falls back to."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from glisson.core.arrays import FloatArray
@@ -127,7 +125,8 @@ class FullPotential:
         gaps = self._pressing.gaps(points)
         near = self._pressing.near(gaps)
         pushes = np.zeros_like(points)
-        pushes[near] = self._pressing.pushes(points[near], gaps[near], full.surface.areas[near])
+        normals, _ = self._pressing.derivatives(points[near])
+        pushes[near] = (full.surface.areas[near] * full.cushion.pressure(gaps[near]))[:, None] * normals
         return full.surface.scatter(pushes)
 
     def step(self, positions: FloatArray, gradient: FloatArray) -> FloatArray:
@@ -149,7 +148,9 @@ class FullPotential:
             points = full.surface.positions(positions)
             gaps = self._pressing.gaps(points)
             near = self._pressing.near(gaps)
-            local = self._pressing.stiffness(points[near], gaps[near], full.surface.areas[near], project)
+            normals, curvatures = self._pressing.derivatives(points[near])
+            areas = full.surface.areas[near]
+            local = self._pressing.stiffness(gaps[near], areas, normals, None if project else curvatures)
             scatter_blocks(near, local, full.surface.shapes, full.pairs, blocks)
         return blocks
 

@@ -10,10 +10,14 @@ from glisson.mechanics.reduced.model import ReducedModel
 
 @dataclass(frozen=True, eq=False)
 class Update:
-    """Node positions (n, 3) in mm, what their error is not above (0 for the full model's own), and whose they are."""
+    """Node positions (n, 3) in mm, what their error is not above, the raw estimate of it, and whether they are full.
+
+    Bound and estimate are 0 where the full model answered.
+    """
 
     positions: FloatArray
     bound_mm: float
+    raw_mm: float
     fell_back: bool
 
 
@@ -45,11 +49,12 @@ class LiveModel:
             answer = reduced.solve(load, start)
             if answer.converged:
                 break
-        bound = reduced.bound_mm(load, answer) if answer.converged else float("inf")
+        raw = reduced.raw_error_mm(load, answer) if answer.converged else float("inf")
+        bound = reduced.estimate.bound_mm(raw)
         self._before = self._state
         if bound <= self._largest_mm:
             self._state = answer.state
-            return Update(reduced.positions(answer), bound, False)
+            return Update(reduced.positions(answer), bound, raw, False)
         positions = self._full.solve(load, reduced.positions(answer))
         self._before = self._state = reduced.state(positions)
-        return Update(positions, 0.0, True)
+        return Update(positions, 0.0, 0.0, True)

@@ -1,8 +1,8 @@
 """How the surface gives way close to a tool: the compliance at rest that the modes don't have.
 
-Few modes are too stiff under a tool's tip, and what is wrong there turns the whole organ. With the compliance K⁻¹ of the
-full model at rest, a force f on surface nodes moves the organ by (K⁻¹ − Φ (Φᵀ K Φ)⁻¹ Φᵀ) f beyond the modes Φ: residual
-flexibility, as in component mode synthesis (Craig and Chang 1977). It turns with the organ.
+Few modes are too stiff under a tool's tip, and what is wrong there turns the whole organ. With the compliance K⁻¹ of
+the full model at rest, a force f on surface nodes moves the organ by (K⁻¹ − Φ (Φᵀ K Φ)⁻¹ Φᵀ) f beyond the modes Φ:
+residual flexibility, as in component mode synthesis (Craig and Chang 1977). It turns with the organ.
 """
 
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ class LocalCompliance:
     compliance: FloatArray
 
     def on_nodes(self, nodes: IntArray, forces: FloatArray) -> FloatArray:
-        """Forces (k, 3) on the nodes that tools reach, of forces (m, 3) on mesh nodes (m,); those elsewhere are left out."""
+        """Forces (k, 3) on the nodes that tools reach, of forces (m, 3) on mesh nodes (m,); others are left out."""
         places = np.minimum(np.searchsorted(self.nodes, nodes), len(self.nodes) - 1)
         reached = self.nodes[places] == nodes
         result = np.zeros((len(self.nodes), 3))

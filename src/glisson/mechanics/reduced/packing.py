@@ -62,7 +62,7 @@ def unpack(arrays: Mapping[str, NDArray[Any]]) -> ReducedModel:
     """
     try:
         materials = {
-            int(number): Material(str(law), *row[:3].tolist(), constants=tuple(row[3:][np.isfinite(row[3:])].tolist()))
+            int(number): _material(str(law), row[np.isfinite(row)].tolist())
             for number, law, row in zip(arrays["regions"], arrays["laws"], arrays["constants"], strict=True)
         }
         points = _unpacked_points("solution", arrays, materials)
@@ -86,10 +86,16 @@ def unpack(arrays: Mapping[str, NDArray[Any]]) -> ReducedModel:
         raise BadInput(f"The reduced model lacks the array {error}.") from error
 
 
+def _material(law: str, numbers: list[float]) -> Material:
+    young_modulus, poisson_ratio, density, *constants = numbers
+    return Material(law, young_modulus, poisson_ratio, density, tuple(constants))
+
+
 def _packed_points(name: str, points: ElasticPoints) -> dict[str, NDArray[Any]]:
     parts = {"strains": points.strains, "weights": points.weights, "regions": points.regions}
     return {f"{name} {part}": values for part, values in parts.items()}
 
 
 def _unpacked_points(name: str, arrays: Mapping[str, NDArray[Any]], materials: Mapping[int, Material]) -> ElasticPoints:
-    return ElasticPoints(*(arrays[f"{name} {part}"] for part in ("strains", "weights", "regions")), materials)
+    strains, weights, regions = (arrays[f"{name} {part}"] for part in ("strains", "weights", "regions"))
+    return ElasticPoints(strains, weights, regions, materials)

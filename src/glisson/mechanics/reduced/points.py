@@ -52,28 +52,25 @@ class ElasticPoints:
         result: FloatArray = (self._flat @ modal).reshape(-1, 9) + self._identity
         return result.reshape(-1, 3, 3)
 
-    def energy(self, modal: FloatArray) -> float:
-        """Strain energy in µJ; infinite where a chosen element is inverted."""
-        gradients = self.gradients(modal)
+    def energy(self, gradients: FloatArray) -> float:
+        """Strain energy in µJ of deformation gradients; infinite where a chosen element is inverted."""
         return sum(
             float(law_of(material).energy(gradients[run], material) @ self.weights[run]) for run, material in self._runs
         )
 
-    def stresses(self, modal: FloatArray) -> FloatArray:
+    def stresses(self, gradients: FloatArray) -> FloatArray:
         """Stress times weight (m, 9)."""
-        gradients = self.gradients(modal)
         stress = np.concatenate([law_of(material).stress(gradients[run], material) for run, material in self._runs])
         result: FloatArray = stress.reshape(-1, 9) * self.weights[:, None]
         return result
 
-    def forces(self, modal: FloatArray) -> FloatArray:
+    def forces(self, gradients: FloatArray) -> FloatArray:
         """Internal forces ∂Ψ/∂q (r,)."""
-        result: FloatArray = self.stresses(modal).ravel() @ self._flat
+        result: FloatArray = self.stresses(gradients).ravel() @ self._flat
         return result
 
-    def stiffness(self, modal: FloatArray, project: bool) -> FloatArray:
+    def stiffness(self, gradients: FloatArray, project: bool = False) -> FloatArray:
         """∂²Ψ/∂q² (r, r); `project` makes each point's part positive semi-definite."""
-        gradients = self.gradients(modal)
         tangents = np.concatenate([law_of(material).tangent(gradients[run], material) for run, material in self._runs])
         if project:
             cut_negative(tangents)
@@ -116,7 +113,7 @@ def _strains(tetrahedra: IntArray, gradients: FloatArray, basis: FloatArray) -> 
 
 @compiled
 def _weighted(tangents: FloatArray, weights: FloatArray, strains: FloatArray) -> FloatArray:
-    """w A G of every point, as (9 m, r)."""
+    """W A G of every point, as (9 m, r)."""
     modes = strains.shape[2]
     result = np.zeros((9 * len(weights), modes))
     for p in range(len(weights)):

@@ -7,6 +7,7 @@ from glisson.core.arrays import FloatArray
 from glisson.mechanics.reduced.contact import ReducedContact
 from glisson.mechanics.reduced.points import ElasticPoints
 
+_FAST = 0.2  # share of a residual that a step may leave, without a new elastic stiffness being made
 _WHOLE_MM = 100.0  # a displacement that counts as much as the largest force
 
 
@@ -17,19 +18,27 @@ class ReducedPotential:
         points: where the elastic energy is taken.
         dead: (r,) dead forces on the modes.
         contact: the tool, if there is one.
+        tangent: (r, r) elastic stiffness of a state nearby, which serves as long as the residual falls fast.
     """
 
-    def __init__(self, points: ElasticPoints, dead: FloatArray, contact: ReducedContact | None) -> None:
+    def __init__(
+        self,
+        points: ElasticPoints,
+        dead: FloatArray,
+        contact: ReducedContact | None,
+        tangent: FloatArray | None = None,
+    ) -> None:
         self._points, self._dead, self._contact = points, dead, contact
         self._size = len(dead)
         self._scale = 0.0
-        self._tangent: FloatArray | None = None
+        self._tangent, self._before = tangent, np.inf
+        self._last: tuple[FloatArray, FloatArray] | None = None
         self.rounding = points.rounding_uj
 
     def energy(self, unknowns: FloatArray) -> float:
         """In µJ; infinite where a chosen element is inverted."""
         modal, pushes = unknowns[: self._size], unknowns[self._size :]
-        energy = self._points.energy(modal) - float(self._dead @ modal)
+        energy = self._points.energy(self._gradients(unknowns)) - float(self._dead @ modal)
         if self._contact is not None and np.isfinite(energy):
             energy += self._contact.energy(unknowns) + 0.5 * float(pushes @ self._contact.compliance @ pushes)
         return energy
@@ -37,7 +46,7 @@ class ReducedPotential:
     def gradient(self, unknowns: FloatArray) -> FloatArray:
         """What is unbalanced: forces in mN on the modes, and displacements in mm along the pushes."""
         gradient = np.zeros_like(unknowns)
-        elastic = self._points.forces(unknowns[: self._size])
+        elastic = self._points.forces(self._gradients(unknowns))
         self._scale = max(float(np.linalg.norm(elastic)), float(np.linalg.norm(self._dead)))
         gradient[: self._size] = elastic - self._dead
         if self._contact is not None:
@@ -47,25 +56,34 @@ class ReducedPotential:
 
     def step(self, unknowns: FloatArray, gradient: FloatArray) -> FloatArray:
         """Newton's step; the exact stiffness where it is positive definite."""
-        modal = unknowns[: self._size]
-        elastic = self._tangent = self._points.stiffness(modal, project=False)
+        residual = self.residual(unknowns, gradient)
+        slow, self._before = residual > _FAST * self._before, residual
+        if self._tangent is None or slow:
+            self._tangent = self._points.stiffness(self._gradients(unknowns))
         for project in (False, True):
             try:
-                return _solved(self._completed(elastic, unknowns, project), gradient)
+                return _solved(self._completed(self._tangent, unknowns, project), gradient)
             except np.linalg.LinAlgError:
                 continue
-        return _solved(self._completed(self._points.stiffness(modal, project=True), unknowns, True), gradient)
+        projected = self._points.stiffness(self._gradients(unknowns), project=True)
+        return _solved(self._completed(projected, unknowns, True), gradient)
 
     def tangent(self, unknowns: FloatArray) -> FloatArray:
         """The elastic stiffness (r, r) of the last step, or here if none was needed."""
-        return self._points.stiffness(unknowns[: self._size], project=False) if self._tangent is None else self._tangent
+        return self._points.stiffness(self._gradients(unknowns)) if self._tangent is None else self._tangent
 
     def stiffness(self, unknowns: FloatArray) -> FloatArray:
         """The second derivatives."""
-        return self._completed(self._points.stiffness(unknowns[: self._size], project=False), unknowns, False)
+        return self._completed(self._points.stiffness(self._gradients(unknowns)), unknowns, False)
 
     def _completed(self, elastic: FloatArray, unknowns: FloatArray, project: bool) -> FloatArray:
         return elastic if self._contact is None else with_contact(elastic, self._contact, unknowns, project)
+
+    def _gradients(self, unknowns: FloatArray) -> FloatArray:
+        """Deformation gradients; those of the last unknowns are kept."""
+        if self._last is None or self._last[0] is not unknowns:
+            self._last = (unknowns, self._points.gradients(unknowns[: self._size]))
+        return self._last[1]
 
     def residual(self, unknowns: FloatArray, gradient: FloatArray) -> float:
         """Unbalanced force on the modes, over the larger of the dead and the elastic ones; pushes count by mm."""

@@ -39,25 +39,17 @@ class Pressing:
         """Numbers of the points that it presses on."""
         return np.flatnonzero(gaps < self.cushion.range_mm)
 
-    def normals(self, points: FloatArray) -> FloatArray:
-        """Its outward normals (p, 3) at points (p, 3)."""
-        return self._derivatives(points)[0]
-
-    def pushes(self, points: FloatArray, gaps: FloatArray, areas: FloatArray) -> FloatArray:
-        """Forces (p, 3) in mN on points (p, 3)."""
-        normals, _ = self._derivatives(points)
-        result: FloatArray = (areas * self.cushion.pressure(gaps))[:, None] * normals
-        return result
-
-    def stiffness(self, points: FloatArray, gaps: FloatArray, areas: FloatArray, project: bool) -> FloatArray:
-        """Stiffness (p, 3, 3) in mN/mm at points; `project` leaves the tool's curvature out, which may be negative."""
-        normals, curvatures = self._derivatives(points)
+    def stiffness(
+        self, gaps: FloatArray, areas: FloatArray, normals: FloatArray, curvatures: FloatArray | None
+    ) -> FloatArray:
+        """Stiffness (p, 3, 3) in mN/mm at points; without the tool's curvatures it is never negative."""
         blocks = (areas * self.cushion.slope(gaps))[:, None, None] * normals[:, :, None] * normals[:, None, :]
-        if project:
+        if curvatures is None:
             return blocks
         result: FloatArray = blocks - (areas * self.cushion.pressure(gaps))[:, None, None] * curvatures
         return result
 
-    def _derivatives(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def derivatives(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Outward normals (p, 3) and curvatures (p, 3, 3), 1/mm, of the distance at points (p, 3)."""
         normals, curvatures = self.tool.derivatives((points - self.translation) @ self.rotation)
         return normals @ self.rotation.T, self.rotation @ curvatures @ self.rotation.T

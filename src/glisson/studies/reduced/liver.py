@@ -45,11 +45,11 @@ def egg() -> Model:
 def liver_model(mesh: TetMesh) -> Model:
     """A mesh scaled so that the longest edge of its box is 220 mm, held at one end of it, with a tip at the other.
 
-    The thick end is the one at which the surface is farther from the box's long axis.
+    The thick end is the one at which a slice of the mesh is wider.
     """
     sizes = np.ptp(mesh.nodes, axis=0)
     axis = int(sizes.argmax())
-    mesh = TetMesh(mesh.nodes * LONGEST_MM / sizes[axis], mesh.tetrahedra, np.zeros(len(mesh.tetrahedra)))
+    mesh = TetMesh(mesh.nodes * LONGEST_MM / sizes[axis], mesh.tetrahedra)
     triangles, _ = mesh.boundary()
     surface = np.unique(triangles)
     along = mesh.nodes[surface, axis]

@@ -1,7 +1,7 @@
 """Loads on the liver, drawn at random: part of its weight, the pull of a grasper, and a bar that presses on it.
 
 A patch of 40 mm does not hold 18 N of liver of 6 kPa: under its whole weight the tip would hang down by hundreds of
-millimetres. What acts is the part of the weight that its neighbours don't bear, drawn as a small share in any direction.
+millimetres. What acts is the part of the weight that its neighbours don't bear, a small share in any direction.
 """
 
 from dataclasses import dataclass
@@ -76,7 +76,7 @@ class Draw:
         return bar, (depth + _CLEAR_MM) * inward
 
     def _surface(self) -> tuple[FloatArray, IntArray, FloatArray]:
-        """Places (f, 3) on the surface that tools reach, surface nodes (s,), and outward normals (f, 3) of the places."""
+        """Places (f, 3) on the surface that tools reach, surface nodes (s,), and the places' outward normals (f, 3)."""
         mesh = self.model.mesh
         triangles, _ = mesh.boundary()
         corners = mesh.nodes[triangles]
