@@ -2,10 +2,14 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from glisson.core.arrays import FloatArray
 from glisson.mechanics.reduced.full import FullModel
 from glisson.mechanics.reduced.load import Load
 from glisson.mechanics.reduced.model import ReducedModel
+
+_UNKNOWN = 0.5  # share of a pull
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +53,8 @@ class LiveModel:
             answer = reduced.solve(load, start)
             if answer.converged:
                 break
-        raw = reduced.raw_error_mm(load, answer) if answer.converged else float("inf")
+        known = answer.converged and self._is_known(load)
+        raw = reduced.raw_error_mm(load, answer) if known else float("inf")
         bound = reduced.estimate.bound_mm(raw)
         self._before = self._state
         if bound <= self._largest_mm:
@@ -58,3 +63,9 @@ class LiveModel:
         positions = self._full.solve(load, reduced.positions(answer))
         self._before = self._state = reduced.state(positions)
         return Update(positions, 0.0, 0.0, True)
+
+    def _is_known(self, load: Load) -> bool:
+        """Whether most of a grasper's pull is where the local compliance is known; elsewhere no estimate sees it."""
+        reached = np.isin(load.nodes, self._reduced.local.nodes)
+        pulls = np.linalg.norm(load.forces, axis=1)
+        return bool(pulls[~reached].sum() <= _UNKNOWN * pulls.sum())
