@@ -133,17 +133,28 @@ class ReducedBenchmark:
     def _reduced(self) -> ReducedModel:
         full, plan = self._full, self._plan
 
-        def make(progress: Progress) -> dict[str, NDArray[Any]]:
-            loads = [self._draw.load(3 * number, _TRAINING_SEED) for number in range(plan.pulls)]
-            pulled = from_rest(full, loads, progress)
-            first = build_reduced(full, pulled, self._draw.reach, plan.first)
-            loads = [self._draw.load(number, _TRAINING_SEED + 1) for number in range(plan.training)]
-            _, trained = from_reduced(full, first, loads, progress)
-            progress(None, "choosing modes and elements")
-            return pack(build_reduced(full, np.concatenate([pulled, trained]), self._draw.reach, plan.sizes))
+        reach = self._draw.reach
 
-        made = replace(plan, loads=0, checked=0, calibration=0, largest_mm=0.0)
-        return unpack(self._kept("model", f"{source_hash(*_MODEL_SOURCES)} {made}", KIND, SCHEMA, make))
+        def pull(progress: Progress) -> dict[str, NDArray[Any]]:
+            loads = [self._draw.load(3 * number, _TRAINING_SEED) for number in range(plan.pulls)]
+            return {"displacements": from_rest(full, loads, progress)}
+
+        def train(progress: Progress) -> dict[str, NDArray[Any]]:
+            loads = [self._draw.load(number, _TRAINING_SEED + 1) for number in range(plan.training)]
+            progress(None, "a first reduced model")
+            first = build_reduced(full, pulled, reach, plan.first)
+            return {"displacements": from_reduced(full, first, loads, progress)[1]}
+
+        def build(progress: Progress) -> dict[str, NDArray[Any]]:
+            progress(None, "choosing modes and elements")
+            return pack(build_reduced(full, np.concatenate([pulled, trained]), reach, plan.sizes))
+
+        by = f"{source_hash(*_LOADS_SOURCES)} {plan.pulls}"
+        pulled = self._kept("pulls", by, _SOLUTIONS, _SOLUTIONS_SCHEMA, pull)["displacements"]
+        by += f" {plan.training}"
+        trained = self._kept("training", by, _SOLUTIONS, _SOLUTIONS_SCHEMA, train)["displacements"]
+        by = f"{source_hash(*_MODEL_SOURCES)} {plan.pulls} {plan.training} {plan.sizes}"
+        return unpack(self._kept("model", by, KIND, SCHEMA, build))
 
     def _judged(
         self, reduced: ReducedModel, seed: int, count: int, largest_mm: float, words: str

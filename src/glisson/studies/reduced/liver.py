@@ -1,7 +1,4 @@
-"""The liver of SOFA's model reduction (Goury and Duriez 2018), at a human size, held by a patch at its thick end.
-
-Where a quick look will do, an egg of few elements stands for it.
-"""
+"""The liver of SOFA's model reduction (Goury and Duriez 2018), at a human size, held by a patch at its thick end."""
 
 from pathlib import Path
 
@@ -12,13 +9,10 @@ from glisson.core.mesh import TetMesh
 from glisson.core.model import Material, Model
 from glisson.io.tetrahedra import read_tetrahedra
 from glisson.mechanics.numbering import numbering
-from glisson.preoperative.meshing.lattice import body_centred_lattice, inside_of_level
 
 LONGEST_MM = 220.0
 HELD, TIP = "back", "tip"
 _PATCH_MM = 40.0
-_EGG = np.array([0.65, 0.6])  # half widths of the egg over half its length
-_SPACING = 0.22
 _MATERIAL = Material("neo-hookean-log", 6.0, 0.45, 1150.0)
 
 
@@ -29,17 +23,6 @@ def sofa_liver(folder: Path) -> Model:
         BadInput: the file is absent or damaged.
     """
     return liver_model(read_tetrahedra(folder / "liverFine.vtu"))
-
-
-def egg() -> Model:
-    """An egg with one end thicker than the other, of about 2,000 elements."""
-    reach = np.array([1.0, *_EGG]) + _SPACING
-    nodes, lattice = body_centred_lattice(-reach, reach, _SPACING)
-    widening = 1.0 - 0.3 * nodes[:, :1]  # thin towards +x
-    level = np.sum((nodes / np.hstack([np.ones_like(widening), widening * _EGG])) ** 2, axis=1) - 1.0
-    nodes, tetrahedra = inside_of_level(nodes, lattice, level)
-    used, tetrahedra = np.unique(tetrahedra, return_inverse=True)
-    return liver_model(TetMesh(nodes[used], tetrahedra.reshape(-1, 4)))
 
 
 def liver_model(mesh: TetMesh) -> Model:

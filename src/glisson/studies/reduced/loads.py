@@ -20,9 +20,9 @@ _REACH = 0.5  # of the organ's length from its tip, where graspers and bars get
 _GRASP_MM = (12.0, 20.0)  # standard deviation of a grasper's pull over the surface
 _PULL_MN = (15.0, 150.0)
 _RADIUS_MM = (10.0, 15.0)
-_DEPTH_MM = (4.0, 30.0)  # of a bar's tip under where the surface was
+_DEPTH_MM = (4.0, 22.0)  # of a bar's tip under where the surface was
 _CLEAR_MM = 2.0
-_BESIDE_MM = 10.0  # by which a bar may slide
+_BESIDE_MM = 35.0  # a grasper's spread, and by which a bar may slide
 _SLANT = 0.5  # tangent of the bar's angle to the surface's normal, standard deviation
 _SHAFT_MM = 150.0
 
@@ -48,11 +48,11 @@ class Draw:
 
     @property
     def reach(self) -> IntArray:
-        """Surface nodes that a bar may touch."""
+        """Surface nodes that a bar may touch and graspers pull."""
         mesh = self.model.mesh
         surface = np.unique(mesh.boundary()[0])
         away = np.linalg.norm(mesh.nodes[surface] - mesh.nodes[self.model.node_set(TIP)[0]], axis=1)
-        found: IntArray = surface[away < _REACH * np.ptp(mesh.nodes, axis=0).max() + _RADIUS_MM[1] + _BESIDE_MM]
+        found: IntArray = surface[away < _REACH * np.ptp(mesh.nodes, axis=0).max() + _BESIDE_MM]
         return found
 
     def _grasp(self, random: np.random.Generator) -> tuple[IntArray, FloatArray]:

@@ -6,7 +6,8 @@ from glisson.core.errors import BadInput
 from glisson.core.model import Model
 from glisson.mechanics.reduced.building import Sizes
 from glisson.studies.reduced.benchmark import Plan
-from glisson.studies.reduced.liver import egg, sofa_liver
+from glisson.studies.reduced.egg import egg
+from glisson.studies.reduced.liver import sofa_liver
 
 WHOLE = Plan(
     pulls=40,
@@ -19,14 +20,14 @@ WHOLE = Plan(
     largest_mm=1.2,
 )
 QUICK = Plan(
-    pulls=12,
-    training=40,
+    pulls=15,
+    training=90,
     calibration=15,
     loads=25,
     checked=3,
     first=Sizes(20, 120, 20, 120, 1e-3),
-    sizes=Sizes(30, 200, 60, 400, 5e-4),
-    largest_mm=2.0,
+    sizes=Sizes(40, 300, 80, 500, 5e-4),
+    largest_mm=4.0,
 )
 
 

@@ -51,8 +51,8 @@ def text_of(values: dict[str, Any]) -> str:
             f"{tip['median']:.0f} mm (median), {tip['worst']:.0f} mm at most",
             f"error     {error['median']:.3f} mm median, {error['p95']:.3f} p95, {error['worst']:.3f} worst "
             "(largest of all nodes)",
-            f"bound     broken on {values['bound_violations']} loads; {effectivity['median']:.1f} times the error in "
-            f"the median, {effectivity['p95']:.1f} at p95",
+            f"bound     broken on {values['bound_violations']} loads; {_times(effectivity['median'])} the error in the "
+            f"median, {_times(effectivity['p95'])} at p95",
             f"full      {100 * values['fallbacks']:.2f} % of updates fell back to the full model, which takes "
             f"{values['full_seconds']:.1f} s from rest",
             f"model     {values['unknowns']} unknowns, {values['points']} elements",
@@ -72,6 +72,12 @@ def _grouped(seconds: dict[str, float]) -> dict[str, float]:
     return groups
 
 
-def _spread(numbers: FloatArray, worst: bool) -> dict[str, float]:
-    found = {"median": float(np.nanmedian(numbers)), "p95": float(np.nanpercentile(numbers, 95.0))}
-    return found | ({"worst": float(np.nanmax(numbers))} if worst else {})
+def _times(number: float | None) -> str:
+    return "an unknown share of" if number is None else f"{number:.1f} times"
+
+
+def _spread(numbers: FloatArray, worst: bool) -> dict[str, float | None]:
+    """Of the numbers that are some; None where there are none."""
+    some = numbers[np.isfinite(numbers)]
+    parts = {"median": 50.0, "p95": 95.0} | ({"worst": 100.0} if worst else {})
+    return {name: float(np.percentile(some, share)) if len(some) else None for name, share in parts.items()}
