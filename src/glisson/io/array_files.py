@@ -23,7 +23,7 @@ def write_arrays(path: str | Path, kind: str, schema: int, arrays: Mapping[str, 
         BadInput: the place cannot be written.
         WriteFailed: the disk is full.
     """
-    values = {**arrays, _KIND: np.array(kind), _SCHEMA: np.array(schema)}
+    values: dict[str, Any] = {**arrays, _KIND: np.array(kind), _SCHEMA: np.array(schema)}
     with atomic_path(Path(path)) as temporary, temporary.open("wb") as stream:
         np.savez(stream, **values)
 
