@@ -17,7 +17,7 @@ from glisson.mechanics.reduced.potential import ReducedPotential
 
 _TOLERANCE = 1e-5
 _LIMIT = 40
-LINEAR_SHARE = 0.2  # of what gives way beyond the modes, which is taken as linear
+_LINEAR_SHARE = 0.2  # of what gives way beyond the modes, which is taken as linear
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +136,7 @@ class ReducedModel:
         modal = self.estimate.modal_mm(
             answer.unknowns, answer.state.tangent, weight, pull, answer.contact, self.surface
         )
-        return modal + LINEAR_SHARE * float(np.sqrt(np.einsum("ni,ni->n", answer.shift, answer.shift).max()))
+        return modal + _LINEAR_SHARE * float(np.sqrt(np.einsum("ni,ni->n", answer.shift, answer.shift).max()))
 
     def positions(self, answer: Answer) -> FloatArray:
         """Node positions (n, 3) in mm."""
