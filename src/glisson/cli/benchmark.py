@@ -1,6 +1,8 @@
 """`glisson benchmark`: measures Glisson beside others; the scripts are in a checkout's `benchmarks/`."""
 
 import argparse
+import json
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from itertools import groupby
@@ -11,8 +13,14 @@ from glisson.cli.console import Answer
 from glisson.cli.progress import StageLines
 from glisson.framework.benchmark import RESULTS, Benchmark, Row
 from glisson.framework.benchmark_plot import PLOT, draw_cost
+from glisson.io.atomic import atomic_path
+from glisson.studies.reduced.benchmark import ReducedBenchmark
+from glisson.studies.reduced.plans import plan_and_model
+from glisson.studies.reduced.report import text_of, values_of
 
 _OURS = "Glisson"
+_REDUCED = "reduced"
+_SHARED_DATA = "GLISSON_SHARED_DATA"
 _FRAMES = "frames"
 _VIDEO_HEADING = "  engine                       seconds  ratio frames/s     MB  px off"
 _MASK_HEADING = "  engine                       seconds  ratio  its     MB    Dice  difference"
@@ -22,10 +30,11 @@ _HEADING = "  engine                  seconds  ratio  its     MB  residual diffe
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "benchmark",
-        choices=("solver", "lift", "segmentation", "tracking"),
+        choices=("solver", "lift", "segmentation", "tracking", _REDUCED),
         help="solver: the same hyperelastic problem on the same meshes by Glisson and by other engines; "
         "lift: the two-stage lever lift with friction; segmentation: the liver of a phantom by contours; "
-        "tracking: 20 markers through a video of 960 × 540",
+        "tracking: 20 markers through a video of 960 × 540; reduced: the reduced model of a liver under loads that it "
+        "has never seen, against full solutions",
     )
     parser.add_argument("--quick", action="store_true", help="one small problem instead of all; some minutes")
     parser.add_argument("--out", metavar="DIR", help="where results go (default: studies/benchmark-NAME)")
@@ -33,11 +42,21 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
     out = Path(arguments.out or f"studies/benchmark-{arguments.benchmark}")
+    if arguments.benchmark == _REDUCED:
+        return _reduced(out, arguments.quick, lines)
     benchmark = Benchmark(arguments.benchmark, out, arguments.quick, lines)
     rows = benchmark.run()
     draw_cost(rows, out / PLOT)
     text = [*_tables(rows), f"difference: {benchmark.difference}", f"results   {out / RESULTS} and {out / PLOT}"]
     return Answer({"rows": [asdict(row) for row in rows]}, "\n".join(text))
+
+
+def _reduced(out: Path, quick: bool, lines: StageLines) -> Answer:
+    plan, model = plan_and_model(quick, Path(os.environ.get(_SHARED_DATA, "../shared/data")))
+    values = values_of(ReducedBenchmark(model, plan, out, 0, lines).run())
+    with atomic_path(out / RESULTS) as path:
+        path.write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
+    return Answer(values, text_of(values) + f"\nresults   {out / RESULTS}")
 
 
 def _tables(rows: Sequence[Row]) -> Iterator[str]:
@@ -83,5 +102,5 @@ COMMAND = Command(
     "  glisson benchmark solver --quick\n  glisson benchmark lift --json > lift.json",
     _add_arguments,
     _run,
-    ("rows",),
+    ("rows", "updates_per_s", "error_mm", "bound_violations", "effectivity", "fallbacks", "loads"),
 )

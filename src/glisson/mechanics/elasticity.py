@@ -111,7 +111,7 @@ class Elasticity:
         def tangents(gradients: FloatArray, chunk: _Chunk) -> FloatArray:
             found = chunk.law.tangent(gradients, chunk.material)
             if project:
-                _cut_negative(found)
+                cut_negative(found)
             return found
 
         self._assemble(tangents, positions, pattern, blocks, symmetric=True)
@@ -255,7 +255,8 @@ def _add_block(
 
 
 @njit(cache=True, nogil=True)
-def _cut_negative(tangents: FloatArray) -> None:
+def cut_negative(tangents: FloatArray) -> None:
+    """Set the negative eigenvalues of tangents (n, 9, 9) to zero, in place."""
     for n in range(len(tangents)):
         values, vectors = np.linalg.eigh(tangents[n])
         if values[0] < 0.0:
