@@ -205,13 +205,18 @@ def _robust_lines(
         slant = (ds * weight * (h - mean_h[:, None])).sum(axis=1) / np.maximum((ds**2 * weight).sum(axis=1), 1e-9)
         level = mean_h - slant * mean_s
         rest = h - level[:, None] - slant[:, None] * s
-        own = np.array([_deviation(one[mask]) for one, mask in zip(rest, used, strict=True)])
-        common = _deviation(rest[used])
+        own, common = _deviations(rest, used), _deviations(rest.reshape(1, -1), used.reshape(1, -1))
         scatter = np.maximum(np.sqrt(0.5 * own**2 + 0.5 * common**2), least)
         used = there & (np.abs(rest) < 3.0 * scatter[:, None])
     return level, slant, used, scatter
 
 
-def _deviation(rest: FloatArray) -> float:
-    """Standard deviation of residuals as their median has it."""
-    return 1.4826 * float(np.median(np.abs(rest))) if rest.size else 0.0
+def _deviations(rest: FloatArray, used: NDArray[np.bool_]) -> FloatArray:
+    """Standard deviation of each row's residuals (edges, n) that are used, as their median has it; 0 of none."""
+    ordered = np.sort(np.where(used, np.abs(rest), np.inf), axis=1)
+    count = used.sum(axis=1)
+    middle = np.stack([np.maximum(count - 1, 0) // 2, count // 2], axis=1)
+    middle = np.minimum(middle, rest.shape[1] - 1)
+    medians = np.take_along_axis(ordered, middle, axis=1).mean(axis=1)
+    result: FloatArray = np.where(count > 0, 1.4826 * medians, 0.0)
+    return result
