@@ -11,15 +11,18 @@ from pathlib import Path
 from glisson.cli.command import Command
 from glisson.cli.console import Answer
 from glisson.cli.progress import StageLines
+from glisson.cli.study import study_answer
 from glisson.framework.benchmark import RESULTS, Benchmark, Row
 from glisson.framework.benchmark_plot import PLOT, draw_cost
 from glisson.io.atomic import atomic_path
+from glisson.studies.local_pool import LocalPool
 from glisson.studies.reduced.benchmark import ReducedBenchmark
 from glisson.studies.reduced.plans import plan_and_model
 from glisson.studies.reduced.report import text_of, values_of
+from glisson.studies.registration.study import SparseDataTwin
 
 _OURS = "Glisson"
-_REDUCED = "reduced"
+_REDUCED, _REGISTRATION = "reduced", "registration"
 _SHARED_DATA = "GLISSON_SHARED_DATA"
 _FRAMES = "frames"
 _VIDEO_HEADING = "  engine                       seconds  ratio frames/s     MB  px off"
@@ -30,11 +33,12 @@ _HEADING = "  engine                  seconds  ratio  its     MB  residual diffe
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "benchmark",
-        choices=("solver", "lift", "segmentation", "tracking", _REDUCED),
+        choices=("solver", "lift", "segmentation", "tracking", _REDUCED, _REGISTRATION),
         help="solver: the same hyperelastic problem on the same meshes by Glisson and by other engines; "
         "lift: the two-stage lever lift with friction; segmentation: the liver of a phantom by contours; "
         "tracking: 20 markers through a video of 960 × 540; reduced: the reduced model of a liver under loads that it "
-        "has never seen, against full solutions",
+        "has never seen, against full solutions; registration: the study "
+        "sparse-data",
     )
     parser.add_argument("--quick", action="store_true", help="one small problem instead of all; some minutes")
     parser.add_argument("--out", metavar="DIR", help="where results go (default: studies/benchmark-NAME)")
@@ -44,6 +48,8 @@ def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
     out = Path(arguments.out or f"studies/benchmark-{arguments.benchmark}")
     if arguments.benchmark == _REDUCED:
         return _reduced(out, arguments.quick, lines)
+    if arguments.benchmark == _REGISTRATION:
+        return study_answer(SparseDataTwin.of(arguments.quick, 0), out, LocalPool(), lines, arguments.quick)
     benchmark = Benchmark(arguments.benchmark, out, arguments.quick, lines)
     rows = benchmark.run()
     draw_cost(rows, out / PLOT)

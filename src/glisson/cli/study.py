@@ -68,13 +68,16 @@ def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
     if arguments.quick and arguments.long:
         raise BadInput("Choose --quick or --long, not both.")
     folder = Path(arguments.out or f"studies/{arguments.study}")
-    study = _study(arguments)
-    executor = _executor(arguments)
+    return study_answer(_study(arguments), folder, _executor(arguments), lines, arguments.quick)
+
+
+def study_answer(study: Study, folder: Path, executor: Executor, lines: StageLines, quick: bool) -> Answer:
+    """Run a study, keep what it says in `results.json` of its folder, and close the executor."""
     try:
-        conclusion, seconds = run_study(study, folder, executor, lines, arguments.quick)
+        conclusion, seconds = run_study(study, folder, executor, lines, quick)
     finally:
         executor.close()
-    values = {**conclusion.values, "study": study.name, "quick": arguments.quick, "seconds": seconds}
+    values = {**conclusion.values, "study": study.name, "quick": quick, "seconds": seconds}
     with atomic_path(folder / "results.json") as temporary:
         temporary.write_text(json.dumps(values, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     times = f"seconds   set-up {seconds['set-up']:.1f} (kept), points {seconds['points']:.1f}"
