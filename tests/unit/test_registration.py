@@ -232,5 +232,7 @@ def test_what_cannot_be_used_is_refused(model: Model) -> None:
             registered("rigid", model, Observations((replace(good, points_mm=points, frame=frame),)))
     with pytest.raises(BadInput, match="no node set"):
         registered("rigid", model, Observations((Observation("landmark", "navel", good.points_mm[:5], 1.0),)))
+    nothing = replace(good, points_mm=np.zeros((0, 3)))
+    assert registered("rigid", model, Observations((good, nothing))).status == Status.CONVERGED
     line = np.linspace([0.0, 0.0, 0.0], [60.0, 0.0, 0.0], 40)
     assert registered("rigid", model, Observations((replace(good, points_mm=line),))).status != Status.CONVERGED

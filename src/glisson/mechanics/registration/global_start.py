@@ -45,7 +45,7 @@ class _Part:
 def rigid_starts(model: Model, observations: Observations) -> list[RigidStart]:
     """The best distinct places of the organ, the best first."""
     places = Places(model)
-    parts = [_part(item, places, model.mesh.nodes) for item in observations.items]
+    parts = [_part(item, places, model.mesh.nodes) for item in observations.items if len(item.points_mm)]
     middles = model.mesh.nodes[:: max(len(model.mesh.nodes) // 4000, 1)]
     rotations, shifts = _starts(parts)
     for iterations, scale, kept in _ROUNDS:

@@ -62,7 +62,7 @@ class Seen:
         self._matches: list[Match] = []
         self._firsts: list[int] = []
         self.count = 0
-        for item in observations.items:
+        for item in (item for item in observations.items if len(item.points_mm)):
             self._firsts.append(self.count)
             self.count += len(item.points_mm)
             errors = _errors(item, model_error)
