@@ -24,8 +24,8 @@ from glisson.mechanics.registration.full_fit import FullFit
 from glisson.mechanics.registration.kelvinlets import kelvinlets
 from glisson.mechanics.registration.motion import BasisMotion, MotionState
 from glisson.mechanics.registration.seen import ModelError, Seen
+from glisson.phantom.sparse_data.closed_form import Bend, Frame
 
-EXACT = ModelError(1e-6, 1e-6)
 TECHNIQUES = ("rigid", "kelvinlets", "linear-basis", "free")
 
 
@@ -57,12 +57,6 @@ def model() -> Model:
     return Model(
         mesh, {0: Material("neo-hookean", 5.0, 0.45)}, {0: "liver"}, sets, Structures(duct=duct, wire_length_mm=60.0)
     )
-
-
-def bent_without_change_of_volume(points: FloatArray, radius: float) -> FloatArray:
-    """Rivlin 1949: layers across z become circles about y, each element of volume what it was."""
-    reach, angle = np.sqrt(radius**2 - 2.0 * radius * points[:, 2]), points[:, 0] / radius
-    return np.stack([reach * np.sin(angle), points[:, 1], radius - reach * np.cos(angle)], axis=1)
 
 
 def pose(seed: int) -> tuple[FloatArray, FloatArray]:
@@ -98,7 +92,7 @@ def test_derivatives_of_the_cost_are_those_of_differences(model: Model) -> None:
     seen = Seen(model, Observations(items), ModelError(0.5, 1e-6))
     state = motion.moved(motion.at_rest(), 0.8 * rng.normal(size=motion.size))
     full = FullFit(model, seen, 50.0)
-    cut = np.full(seen.count, 9.0)
+    cut = np.full(len(seen.item), 9.0)
     here, step = _at(motion, seen, state, cut), rng.normal(size=motion.size)
     everywhere, push = full._at(motion.positions(state), cut), rng.normal(size=model.mesh.nodes.shape)
     slopes = float(here.gradient @ step), float((full._gradient(everywhere) * push).sum())
@@ -202,7 +196,9 @@ def test_an_incompressible_bend_is_followed_into_the_inside(model: Model) -> Non
     """A closed form that no basis of ours holds, seen all over the surface and at 120 marks of it."""
     rng = np.random.default_rng(2)
     whole = replace(model, node_sets={"upper": np.unique(model.mesh.boundary()[0])})
-    there = bent_without_change_of_volume(model.mesh.nodes, 220.0)
+    there = Bend(Frame(np.zeros(3), np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])), 220.0).forward(
+        model.mesh.nodes
+    )
     surface = np.unique(model.mesh.boundary()[0])
     corners = {f"corner {number}": [number] for number in surface[evenly_spread(model.mesh.nodes[surface], 120)]}
     whole = replace(whole, node_sets={**whole.node_sets, **corners})

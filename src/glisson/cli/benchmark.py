@@ -1,7 +1,6 @@
 """`glisson benchmark`: measures Glisson beside others; the scripts are in a checkout's `benchmarks/`."""
 
 import argparse
-import json
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
@@ -11,10 +10,11 @@ from pathlib import Path
 from glisson.cli.command import Command
 from glisson.cli.console import Answer
 from glisson.cli.progress import StageLines
-from glisson.cli.study import study_answer
+from glisson.cli.study import study_answer, whole_number
+from glisson.core.errors import BadInput
 from glisson.framework.benchmark import RESULTS, Benchmark, Row
 from glisson.framework.benchmark_plot import PLOT, draw_cost
-from glisson.io.atomic import atomic_path
+from glisson.io.records import write_json
 from glisson.studies.local_pool import LocalPool
 from glisson.studies.reduced.benchmark import ReducedBenchmark
 from glisson.studies.reduced.plans import plan_and_model
@@ -41,15 +41,19 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
         "sparse-data",
     )
     parser.add_argument("--quick", action="store_true", help="one small problem instead of all; some minutes")
+    parser.add_argument("--seed", metavar="N", help="seed of the cases (reduced, registration; default 0)")
     parser.add_argument("--out", metavar="DIR", help="where results go (default: studies/benchmark-NAME)")
 
 
 def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
     out = Path(arguments.out or f"studies/benchmark-{arguments.benchmark}")
+    if arguments.seed is not None and arguments.benchmark not in (_REDUCED, _REGISTRATION):
+        raise BadInput(f"The benchmark {arguments.benchmark} draws no cases, so it has no --seed.")
+    seed = whole_number(arguments.seed, "--seed", 0) or 0
     if arguments.benchmark == _REDUCED:
-        return _reduced(out, arguments.quick, lines)
+        return _reduced(out, arguments.quick, seed, lines)
     if arguments.benchmark == _REGISTRATION:
-        return study_answer(SparseDataTwin.of(arguments.quick, 0), out, LocalPool(), lines, arguments.quick)
+        return study_answer(SparseDataTwin.of(arguments.quick, seed), out, LocalPool(), lines, arguments.quick)
     benchmark = Benchmark(arguments.benchmark, out, arguments.quick, lines)
     rows = benchmark.run()
     draw_cost(rows, out / PLOT)
@@ -57,11 +61,10 @@ def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
     return Answer({"rows": [asdict(row) for row in rows]}, "\n".join(text))
 
 
-def _reduced(out: Path, quick: bool, lines: StageLines) -> Answer:
+def _reduced(out: Path, quick: bool, seed: int, lines: StageLines) -> Answer:
     plan, model = plan_and_model(quick, Path(os.environ.get(_SHARED_DATA, "../shared/data")))
-    values = values_of(ReducedBenchmark(model, plan, out, 0, lines).run())
-    with atomic_path(out / RESULTS) as path:
-        path.write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
+    values = values_of(ReducedBenchmark(model, plan, out, seed, lines).run())
+    write_json(out / RESULTS, values)
     return Answer(values, text_of(values) + f"\nresults   {out / RESULTS}")
 
 

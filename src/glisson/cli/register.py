@@ -3,7 +3,6 @@
 import argparse
 import time
 from dataclasses import fields
-from typing import Any
 
 from glisson.cli.command import Command
 from glisson.cli.console import Answer
@@ -11,7 +10,7 @@ from glisson.cli.options import add_case
 from glisson.cli.progress import StageLines
 from glisson.core.registry import list_techniques, technique_class
 from glisson.framework.case import open_case
-from glisson.framework.registering import LINEAR_BASIS, RegisteredCase, answer_values, register_case
+from glisson.framework.registering import LINEAR_BASIS, RegisteredCase, register_case
 
 _KEYS = (
     "status", "message", "technique", "frame", "unobserved", "set_aside", "sigma_mm", "tumours", "notes", "folder",
@@ -50,11 +49,12 @@ def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
     made = register_case(case, arguments.observations, arguments.technique, parameters, progress)
     seconds = time.perf_counter() - started
     lines.ended("register", seconds)
-    values = answer_values(made.found, made.tumours) | {"technique": arguments.technique, "folder": str(made.folder)}
-    return Answer(values | {"seconds": seconds}, _text(made, values), 0 if made.found.status.is_good else 1)
+    more = {"folder": str(made.folder), "seconds": seconds}
+    return Answer(made.values | more, _text(made), 0 if made.found.status.is_good else 1)
 
 
-def _text(made: RegisteredCase, values: dict[str, Any]) -> str:
+def _text(made: RegisteredCase) -> str:
+    values = made.values
     told = [f"status      {values['message']}"]
     for tumour in made.tumours:
         x, y, z = tumour.after_mm

@@ -88,7 +88,7 @@ def _study(arguments: argparse.Namespace) -> Study:
     for option, studies in _OWN_OPTIONS.items():
         if getattr(arguments, option) and arguments.study not in studies:
             raise BadInput(f"{arguments.study} has no --{option}; that is for the study {', '.join(studies)}.")
-    seed = _whole_number(arguments.seed, "--seed", 0) or 0
+    seed = whole_number(arguments.seed, "--seed", 0) or 0
     if arguments.study == LiftRobustness.name:
         return LiftRobustness.of(arguments.quick, seed)
     if arguments.study == ContactStudy.name:
@@ -112,13 +112,14 @@ def _study(arguments: argparse.Namespace) -> Study:
 
 def _executor(arguments: argparse.Namespace) -> Executor:
     if arguments.scheduler is None:
-        return LocalPool(_whole_number(arguments.workers, "--workers", 1))
+        return LocalPool(whole_number(arguments.workers, "--workers", 1))
     if arguments.workers is not None:
         raise BadInput("--workers is for this machine; a Dask cluster has its own number of workers.")
     return DaskCluster(arguments.scheduler)
 
 
-def _whole_number(text: str | None, option: str, least: int) -> int | None:
+def whole_number(text: str | None, option: str, least: int) -> int | None:
+    """What an option says; None where it was not given."""
     if text is None:
         return None
     if not text.isdecimal() or int(text) < least:

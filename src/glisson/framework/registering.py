@@ -15,8 +15,9 @@ from glisson.core.registered import Registered
 from glisson.core.registry import make_technique
 from glisson.core.structures import Tumour
 from glisson.framework.case import MODEL, OBSERVATIONS, RESULTS, Case
+from glisson.framework.lock import exclusive
 from glisson.geometry.location import PointLocator
-from glisson.geometry.mapping import PointMap
+from glisson.io.atomic import atomic_folder
 from glisson.io.deformation_files import write_deformation
 from glisson.io.model_files import read_model
 from glisson.io.observation_files import read_observations
@@ -39,10 +40,11 @@ class TumourNow:
 
 @dataclass(frozen=True, eq=False)
 class RegisteredCase:
-    """The answer, the tumours by it, and the folder in which both were written."""
+    """The answer, the tumours by it, all of it in plain `values`, and the folder in which it was written."""
 
     found: Registered
     tumours: tuple[TumourNow, ...]
+    values: dict[str, Any]
     folder: Path
 
 
@@ -63,47 +65,44 @@ def register_case(
         progress: told how far it is.
 
     Raises:
-        BadInput: there is no model, or the observations cannot be of it.
+        BadInput: there is no model, the observations cannot be of it, or the case cannot be written.
         StageFailed: the organ does not come to rest on what was seen.
+        WriteFailed: the disk is full.
     """
     if not case.has(MODEL):
         raise BadInput(f"The case {case.folder} has no model yet; make it with: glisson mesh {case.folder}")
+    case.check_writable()
     made = make_technique("registration", technique, parameters or {}, "register")
     model = read_model(case.path(MODEL))
     found: Registered = made.register(model, read_observations(observations or case.path(OBSERVATIONS)), progress)
     tumours = tuple(_now(tumour, found) for tumour in model.structures.tumours)
-    folder = case.path(REGISTERED)
-    folder.mkdir(parents=True, exist_ok=True)
-    write_deformation(folder, found.deformation)
-    write_json(folder / _ANSWER, answer_values(found, tumours) | {"technique": technique})
-    return RegisteredCase(found, tumours, folder)
+    values = _values(found, tumours) | {"technique": technique}
+    with exclusive(case.folder), atomic_folder(case.path(REGISTERED)) as folder:
+        write_deformation(folder, found.deformation)
+        write_json(folder / _ANSWER, values)
+    return RegisteredCase(found, tumours, values, case.path(REGISTERED))
 
 
-def answer_values(found: Registered, tumours: tuple[TumourNow, ...]) -> dict[str, Any]:
-    """The answer in plain values."""
+def _values(found: Registered, tumours: tuple[TumourNow, ...]) -> dict[str, Any]:
+    nodes = np.arange(len(found.spread_mm))[:, None]
+    largest = np.linalg.eigvalsh(found.covariance(nodes, np.ones(nodes.shape)))[:, -1]
     return {
         "status": found.status.value,
         "message": found.deformation.message,
         "frame": found.frame,
         "unobserved": list(found.unobserved),
         "set_aside": found.set_aside,
-        "sigma_mm": float(np.median(_sigma(found))),
+        "sigma_mm": float(np.sqrt(np.median(largest))),
         "tumours": [vars(tumour) for tumour in tumours],
         "notes": list(found.notes),
     }
 
 
-def _sigma(found: Registered) -> FloatArray:
-    """Standard deviation (n,) of each node along its least certain direction."""
-    sigma: FloatArray = np.linalg.norm(found.spread_mm, ord=2, axis=(1, 2))
-    return sigma
-
-
 def _now(tumour: Tumour, found: Registered) -> TumourNow:
     mesh, before = found.deformation.mesh, tumour.centroid_mm
-    after = PointMap(mesh, found.deformation.displacement).forward(before)[0]
     locator = PointLocator(mesh)
     location = locator.locate(before)
+    after = locator.interpolate(location, found.positions_mm)[0]
     covariance = found.covariance(mesh.tetrahedra[location.elements], locator.weights(location))[0]
     radius = float(np.sqrt(chi2.ppf(0.95, 3) * np.linalg.eigvalsh(covariance)[-1]))
     return TumourNow(tumour.name, _three(before), _three(after), radius)

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from glisson.core.arrays import FloatArray
+from glisson.core.damping import Damping
 from glisson.core.errors import StageFailed
 from glisson.core.status import Status
 
@@ -15,7 +16,6 @@ State = TypeVar("State")
 
 _ITERATIONS = 300
 _LEAST_GAIN = 1e-10
-_MOST_DAMPING = 1e8
 _SINGULAR = 1e-13
 
 
@@ -49,29 +49,25 @@ def minimum(
     Raises:
         StageFailed: it does not come to rest.
     """
-    state, here, damping, growth = start, equations_at(start), 1e-4, 2.0
+    state, here, damping = start, equations_at(start), Damping()
     for _ in range(_ITERATIONS):
-        scale = np.diag(here.matrix) + 1e-12 * np.trace(here.matrix)
+        extra = damping.share * (np.diag(here.matrix) + 1e-12 * np.trace(here.matrix))
         try:
-            step = cho_solve(cho_factor(here.matrix + damping * np.diag(scale)), -here.gradient)
+            step = cho_solve(cho_factor(here.matrix + np.diag(extra)), -here.gradient)
         except LinAlgError:
-            damping, growth = damping * growth, 2.0 * growth
+            damping.raised()
             continue
         tried = moved(state, step)
         there = equations_at(tried)
-        if there.cost < here.cost:
-            gain = here.cost - there.cost
-            promised = 0.5 * float(step @ (damping * scale * step - here.gradient))
-            # The damping falls by as much as the equations kept their promise (Nielsen 1999).
-            damping, growth = damping * max(1.0 / 3.0, 1.0 - (2.0 * gain / promised - 1.0) ** 3), 2.0
+        gain = here.cost - there.cost
+        if gain > 0.0:
+            damping.eased(gain, 0.5 * float(step @ (extra * step - here.gradient)))
             settled = gain < _LEAST_GAIN * here.cost
             state, here = tried, there
             if settled:
                 return Minimum(state, here)
-        elif damping > _MOST_DAMPING:
-            return Minimum(state, here)  # no step is short enough to gain anything
-        else:
-            damping, growth = damping * growth, 2.0 * growth
+        elif not damping.raised():
+            return Minimum(state, here)
     raise StageFailed(
         "Poses and points could not be brought together; check what was given, or take more views.",
         Status.ITERATION_LIMIT,

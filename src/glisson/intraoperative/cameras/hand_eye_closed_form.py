@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from glisson.core.arrays import FloatArray
 from glisson.core.transform import RigidTransform
+from glisson.geometry.rotations import nearest_rotation
 
 
 def hand_eye_closed_form(
@@ -23,18 +23,11 @@ def hand_eye_closed_form(
     tracked = np.stack([pose.rotation for pose in marker_from_base])
     of_camera = Rotation.from_matrix(seen[first] @ seen[second].transpose(0, 2, 1)).as_rotvec()
     of_marker = Rotation.from_matrix(tracked[first] @ tracked[second].transpose(0, 2, 1)).as_rotvec()
-    turn_x = _nearest_rotation(of_camera.T @ of_marker)
-    turn_z = _nearest_rotation(((turn_x @ tracked).transpose(0, 2, 1) @ seen).sum(axis=0))
+    turn_x = nearest_rotation(of_camera.T @ of_marker)
+    turn_z = nearest_rotation(((turn_x @ tracked).transpose(0, 2, 1) @ seen).sum(axis=0))
     rows, right = [], []
     for a, b in zip(camera_from_board, marker_from_base, strict=True):
         rows.append(np.hstack([np.eye(3), turn_x @ b.rotation]))
         right.append(a.translation_mm - turn_x @ b.translation_mm)
     shifts = np.linalg.lstsq(np.concatenate(rows), np.concatenate(right), rcond=None)[0]
     return RigidTransform("camera", "marker", turn_x, shifts[:3]), RigidTransform("base", "board", turn_z, shifts[3:])
-
-
-def _nearest_rotation(matrix: FloatArray) -> FloatArray:
-    """The rotation R that makes the trace of Rᵀ M greatest."""
-    left, _, right = np.linalg.svd(matrix)
-    result: FloatArray = left @ np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))]) @ right
-    return result

@@ -10,6 +10,7 @@ from glisson.core.camera import Camera
 from glisson.core.crosses import CrossLayout, unit_corners
 from glisson.core.marker_colours import MARKER_COLOURS
 from glisson.core.transform import RigidTransform, cross_matrix
+from glisson.geometry.rotations import nearest_rotation
 from glisson.intraoperative.cameras.adjustment import Minimum, NormalEquations, minimum
 from glisson.intraoperative.cameras.projection import project_with_jacobian
 from glisson.intraoperative.trocar.corners import SeenCorners
@@ -86,8 +87,7 @@ def in_frame_of(
     """
     have, want = (np.array([place.translation_mm for place in some]) for some in (places, designed))
     middle, aim = have.mean(axis=0), want.mean(axis=0)
-    u, _, vt = np.linalg.svd((want - aim).T @ (have - middle))
-    rotation = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+    rotation = nearest_rotation((want - aim).T @ (have - middle))
     motion = RigidTransform("room", "room", rotation, aim - rotation @ middle)
     moved = [motion.after(place) for place in places]
     turned = np.kron(np.eye(2 * len(places)), rotation)

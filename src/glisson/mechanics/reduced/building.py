@@ -7,6 +7,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from glisson.core.arrays import FloatArray, IntArray
+from glisson.geometry.spreading import evenly_spread
 from glisson.mechanics.reduced.basis import modes
 from glisson.mechanics.reduced.contact import reduced_surface
 from glisson.mechanics.reduced.cubature import Cubature, choose_points
@@ -58,10 +59,11 @@ def build_reduced(full: FullModel, displacements: FloatArray, reach: IntArray, s
     in_all = [with_tangent(stiffness, tangent) for tangent in tangents]
     estimating = _cubature(every, some, in_all, sizes.estimate_points, sizes.tolerance)
     mesh, surface = full.model.mesh, full.surface
+    skin = np.unique(surface.nodes)
     estimate = ErrorEstimate(
         some_points(every, estimating.points, estimating.factors),
         stiffness,
-        basis[_spread(mesh.nodes, np.unique(surface.nodes), _SENTINELS)],
+        basis[skin[evenly_spread(mesh.nodes[skin], _SENTINELS)]],
     )
     return ReducedModel(
         full.rest,
@@ -112,13 +114,3 @@ def _definite(matrix: FloatArray) -> FloatArray:
     values, vectors = np.linalg.eigh(matrix)
     result: FloatArray = (vectors * np.maximum(values, _LEAST * values[-1])) @ vectors.T
     return result
-
-
-def _spread(places: FloatArray, nodes: IntArray, count: int) -> IntArray:
-    """Up to `count` of the nodes, each as far from those before as can be."""
-    chosen = [int(nodes[0])]
-    away = np.linalg.norm(places[nodes] - places[chosen[0]], axis=1)
-    while len(chosen) < min(count, len(nodes)):
-        chosen.append(int(nodes[away.argmax()]))
-        away = np.minimum(away, np.linalg.norm(places[nodes] - places[chosen[-1]], axis=1))
-    return np.array(chosen)

@@ -11,6 +11,7 @@ import numpy as np
 
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.geometry.compiled import compiled
+from glisson.geometry.rotations import nearest_rotation
 from glisson.mechanics.pattern import Stiffness
 from glisson.mechanics.reduced.full import FullModel
 
@@ -45,14 +46,10 @@ class LocalCompliance:
 
 
 def turn_of(rest: FloatArray, places: FloatArray) -> FloatArray:
-    """The rotation (3, 3) that takes nodes at rest (c, 3) nearest to where they are (Kabsch 1976)."""
+    """The rotation (3, 3) that takes nodes at rest (c, 3) nearest to where they are."""
     if len(rest) < 3:
         return np.eye(3)
-    spread = (rest - rest.mean(axis=0)).T @ (places - places.mean(axis=0))
-    u, _, vt = np.linalg.svd(spread)
-    mirror = np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
-    turn: FloatArray = (u @ mirror @ vt).T
-    return turn
+    return nearest_rotation((places - places.mean(axis=0)).T @ (rest - rest.mean(axis=0)))
 
 
 def local_compliance(full: FullModel, reach: IntArray, basis: FloatArray) -> LocalCompliance:

@@ -1,7 +1,7 @@
 """Elastic energy, forces and stiffness in the modes, over chosen quadrature points."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -15,6 +15,8 @@ from glisson.mechanics.elements import quadrature
 from glisson.mechanics.materials.law import law_of
 from glisson.mechanics.reduced.minimise import rounding_uj
 
+_IDENTITY = np.eye(3).ravel()
+
 
 @dataclass(frozen=True, eq=False)
 class ElasticPoints:
@@ -27,7 +29,6 @@ class ElasticPoints:
     weights: FloatArray
     regions: IntArray
     materials: Mapping[int, Material]
-    _identity: FloatArray = field(init=False, default_factory=lambda: np.eye(3).ravel())
 
     @cached_property
     def _runs(self) -> list[tuple[slice, Material]]:
@@ -49,7 +50,7 @@ class ElasticPoints:
 
     def gradients(self, modal: FloatArray) -> FloatArray:
         """Deformation gradients (m, 3, 3) at modal displacements (r,)."""
-        result: FloatArray = (self._flat @ modal).reshape(-1, 9) + self._identity
+        result: FloatArray = (self._flat @ modal).reshape(-1, 9) + _IDENTITY
         return result.reshape(-1, 3, 3)
 
     def energy(self, gradients: FloatArray) -> float:

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from glisson.core.arrays import FloatArray
+from glisson.core.damping import Damping
 from glisson.core.errors import StageFailed
 from glisson.core.status import Status
 from glisson.mechanics.registration.motion import Motion, MotionState
@@ -16,7 +17,6 @@ from glisson.mechanics.registration.seen import Seen
 
 _ITERATIONS = 200
 _AT_REST = 1e-4
-_MOST_DAMPING = 1e6
 _LONGEST_MM = 15.0
 
 
@@ -28,7 +28,7 @@ class Fit:
         state: of the motion.
         rows: what was seen, there.
         beliefs: (p,) how far each observed point is believed, 0 to 1.
-        data, prior: Hessians (size, size) of what was seen and of the motion's own cost.
+        hessian: (size, size) of the cost.
         gradient: (size,) of the cost.
         cost: half the sum of all squares.
     """
@@ -36,8 +36,7 @@ class Fit:
     state: MotionState
     rows: Rows
     beliefs: FloatArray
-    data: FloatArray
-    prior: FloatArray
+    hessian: FloatArray
     gradient: FloatArray
     cost: float
 
@@ -54,30 +53,23 @@ def fit(motion: Motion, seen: Seen, start: MotionState) -> Fit:
 
 def _descend(motion: Motion, seen: Seen, state: MotionState, cut: FloatArray) -> Fit:
     rest = Rest(_AT_REST)
-    damping, growth = 1e-6, 2.0
-    here = _at(motion, seen, state, cut)
+    here, damping = _at(motion, seen, state, cut), Damping()
     for _ in range(_ITERATIONS):
-        matrix = here.data + here.prior
-        scale = damping * (np.diag(matrix) + 1e-9 * np.trace(matrix) / len(matrix))
+        extra = damping.share * (np.diag(here.hessian) + 1e-9 * np.trace(here.hessian) / motion.size)
         try:
-            step = cho_solve(cho_factor(matrix + np.diag(scale)), -here.gradient)
+            step = cho_solve(cho_factor(here.hessian + np.diag(extra)), -here.gradient)
         except LinAlgError:
-            damping, growth = damping * growth, 2.0 * growth
+            damping.raised()
             continue
         share = min(1.0, _LONGEST_MM / max(_length(step), 1e-12))
         there = _at(motion, seen, motion.moved(here.state, share * step), cut)
         gained = here.cost - there.cost
         if gained > 0.0:
-            # The damping falls by as much as the step kept its promise (Nielsen 1999).
-            promised = 0.5 * share * float(step @ (scale * step - here.gradient))
-            kept = min(gained / promised, 2.0)
-            damping, growth = max(damping * max(1.0 / 3.0, 1.0 - (2.0 * kept - 1.0) ** 3), 1e-9), 2.0
+            damping.eased(gained, 0.5 * share * float(step @ (extra * step - here.gradient)))
             here = there
             if rest.reached(here.cost):
                 return here
-        elif damping < _MOST_DAMPING:
-            damping, growth = damping * growth, 2.0 * growth
-        else:
+        elif not damping.raised():
             return here
     raise StageFailed("The organ does not come to rest on what was seen.", Status.ITERATION_LIMIT)
 
@@ -89,7 +81,7 @@ def _at(motion: Motion, seen: Seen, state: MotionState, cut: FloatArray) -> Fit:
     jacobian = _jacobian(motion, state, rows)
     weighted = jacobian * judgement.weights[:, None]
     gradient = pull - weighted.T @ rows.residuals
-    return Fit(state, rows, judgement.beliefs, weighted.T @ jacobian, prior, gradient, judgement.cost + own)
+    return Fit(state, rows, judgement.beliefs, weighted.T @ jacobian + prior, gradient, judgement.cost + own)
 
 
 def _jacobian(motion: Motion, state: MotionState, rows: Rows) -> FloatArray:

@@ -4,17 +4,11 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from glisson.core.model import Model
-from glisson.core.observations import Observations
 from glisson.core.parameters import parameter
-from glisson.core.protocols import Progress, silent
-from glisson.core.registered import Registered
-from glisson.mechanics.registration.checks import check_observations
 from glisson.mechanics.registration.elastic_parameters import ElasticParameters
-from glisson.mechanics.registration.expected_energy import energy_per_mode_uj
+from glisson.mechanics.registration.elastic_technique import Deformed, ElasticTechnique
 from glisson.mechanics.registration.full_fit import FullFit
-from glisson.mechanics.registration.motion import BasisMotion
-from glisson.mechanics.registration.outcome import outcome
-from glisson.mechanics.registration.placing import RIGID_ERROR, placed
+from glisson.mechanics.registration.motion import BasisMotion, MotionState
 from glisson.mechanics.registration.seen import Seen
 
 
@@ -25,35 +19,18 @@ class FreeParameters(ElasticParameters):
     modes: int = parameter(60, "how many of the least certain ways to move are told", minimum=6)
 
 
-class Free:
+class Free(ElasticTechnique):
     """Every node may move, at the cost of strain energy; in the spirit of BCF-FEM (Yang et al. 2024)."""
 
     name: ClassVar[str] = "free"
     summary: ClassVar[str] = "hyperelastic, every node free, no boundary condition"
     Parameters: ClassVar[type[FreeParameters]] = FreeParameters
+    _chosen: FreeParameters
 
-    def __init__(self, parameters: FreeParameters) -> None:
-        self._parameters = parameters
-
-    @classmethod
-    def missing_dependencies(cls) -> tuple[str, ...]:
-        """Nothing beyond the core."""
-        return ()
-
-    def register(self, model: Model, observations: Observations, progress: Progress = silent) -> Registered:
-        """See `Registration`."""
-        check_observations(model, observations)
-        progress(0.0, "placing the organ")
-        rigid = BasisMotion(model.mesh.nodes)
-        place = placed(model, observations, Seen(model, observations, RIGID_ERROR), rigid)
-        chosen = self._parameters
-        seen = Seen(model, observations, chosen.model_error)
-        progress(0.4, "deforming the organ")
-        full = FullFit(model, seen, energy_per_mode_uj(model, chosen.strain))
+    def _deformed(self, model: Model, seen: Seen, place: MotionState, energy_uj: float) -> Deformed:
+        full = FullFit(model, seen, energy_uj)
         try:
-            found = full.fit(rigid.positions(place.fit.state))
-            progress(0.8, "how sure it is")
-            spread = full.posterior_spread(found, chosen.modes)
+            found = full.fit(BasisMotion(model.mesh.nodes).positions(place))
+            return Deformed(found.positions, full.posterior_spread(found, self._chosen.modes), found.beliefs)
         finally:
             full.close()
-        return outcome(model, observations.frame, found.positions, spread, found.beliefs, place.ambiguous)

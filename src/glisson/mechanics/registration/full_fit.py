@@ -6,6 +6,7 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from glisson.core.arrays import FloatArray
+from glisson.core.damping import Damping
 from glisson.core.errors import StageFailed
 from glisson.core.model import Model
 from glisson.core.status import Status
@@ -19,7 +20,6 @@ from glisson.mechanics.registration.seen import Seen
 
 _ITERATIONS = 100
 _AT_REST = 1e-3
-_MOST_DAMPING, _AFTER_FAILURE = 1e6, 1e-3
 _HOLDING = 1e-6
 """Stiffness per node (1/mm²) that keeps the matrix regular where nothing holds a rigid motion."""
 
@@ -82,27 +82,22 @@ class FullFit:
 
     def _descend(self, positions: FloatArray, cut: FloatArray) -> FullState:
         rest = Rest(_AT_REST)
-        here = self._at(positions, cut)
-        damping, growth = 1e-6, 2.0
+        here, damping = self._at(positions, cut), Damping()
         for _ in range(_ITERATIONS):
             gradient = self._gradient(here)
-            if not self._solver.factor(self._hessian(here, damping)):
-                damping, growth = damping * growth, 2.0 * growth
+            if not self._solver.factor(self._hessian(here, damping.share)):
+                damping.raised()
                 continue
             step = self._solved(-gradient)
             there = self._at(here.positions + step, cut)
             gained = here.cost - there.cost
             if gained > 0.0:
-                # The damping falls by as much as the step kept its promise (Nielsen 1999).
-                kept = min(gained / max(-0.5 * float((gradient * step).sum()), 1e-12), 2.0)
-                damping, growth = max(damping * max(1.0 / 3.0, 1.0 - (2.0 * kept - 1.0) ** 3), 1e-9), 2.0
+                damping.eased(gained, -0.5 * float((gradient * step).sum()))
                 here = there
                 if rest.reached(here.cost):
                     return here
-            elif damping < _MOST_DAMPING:
-                damping, growth = max(damping, _AFTER_FAILURE) * growth, 2.0 * growth
-            else:
-                return here  # no step is short enough to gain anything
+            elif not damping.raised():
+                return here
         raise StageFailed("The organ does not come to rest on what was seen.", Status.ITERATION_LIMIT)
 
     def _at(self, positions: FloatArray, cut: FloatArray) -> FullState:

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from glisson.core.arrays import FloatArray
 from glisson.core.model import Model
 from glisson.core.observations import Observation, Observations
+from glisson.geometry.rotations import nearest_rotation
 from glisson.geometry.spreading import evenly_spread
 from glisson.mechanics.registration.places import Places
 
@@ -128,8 +129,5 @@ def _closer(
     whole = weight.sum(axis=1, keepdims=True)
     from_middle = (weight * model).sum(axis=1, keepdims=True) / whole
     to_middle = (weight * seen).sum(axis=1, keepdims=True) / whole
-    left, _, right = np.linalg.svd(np.einsum("spi,spj->sij", weight * (seen - to_middle), model - from_middle))
-    sign = np.ones((len(left), 3))
-    sign[:, 2] = np.sign(np.linalg.det(left) * np.linalg.det(right))
-    turned = (left * sign[:, None]) @ right
+    turned = nearest_rotation(np.einsum("spi,spj->sij", weight * (seen - to_middle), model - from_middle))
     return turned, to_middle[:, 0] - np.einsum("sij,sj->si", turned, from_middle[:, 0])

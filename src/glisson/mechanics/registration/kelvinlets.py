@@ -7,18 +7,12 @@ import numpy as np
 
 from glisson.core.arrays import FloatArray
 from glisson.core.model import Model
-from glisson.core.observations import Observations
 from glisson.core.parameters import parameter
-from glisson.core.protocols import Progress, silent
-from glisson.core.registered import Registered
 from glisson.geometry.quadratic import straight_boundary
 from glisson.geometry.spreading import evenly_spread
 from glisson.mechanics.registration.basis import ElasticModes, elastic_modes
-from glisson.mechanics.registration.checks import check_observations
-from glisson.mechanics.registration.elastic_fit import elastic_fit
 from glisson.mechanics.registration.elastic_parameters import ElasticParameters
-from glisson.mechanics.registration.expected_energy import energy_per_mode_uj
-from glisson.mechanics.registration.motion import BasisMotion
+from glisson.mechanics.registration.elastic_technique import ModalTechnique
 
 
 @dataclass(frozen=True)
@@ -29,29 +23,16 @@ class KelvinletsParameters(ElasticParameters):
     radius_mm: float = parameter(30.0, "how blunt the forces are, mm", minimum=1.0)
 
 
-class Kelvinlets:
+class Kelvinlets(ModalTechnique):
     """Regularised Kelvinlets (de Goes and James 2017), superposed as by Ringel et al. 2022."""
 
     name: ClassVar[str] = "kelvinlets"
     summary: ClassVar[str] = "blunt forces in endless elastic tissue; needs no mesh but places"
     Parameters: ClassVar[type[KelvinletsParameters]] = KelvinletsParameters
+    _chosen: KelvinletsParameters
 
-    def __init__(self, parameters: KelvinletsParameters) -> None:
-        self._parameters = parameters
-
-    @classmethod
-    def missing_dependencies(cls) -> tuple[str, ...]:
-        """Nothing beyond the core."""
-        return ()
-
-    def register(self, model: Model, observations: Observations, progress: Progress = silent) -> Registered:
-        """See `Registration`."""
-        check_observations(model, observations)
-        chosen = self._parameters
-        modes = kelvinlet_modes(model, chosen.centres, chosen.radius_mm)
-        precision = np.diag(2.0 * modes.energies_uj / energy_per_mode_uj(model, chosen.strain))
-        motion = BasisMotion(model.mesh.nodes, modes.basis, precision)
-        return elastic_fit(model, observations, motion, chosen.model_error, progress)
+    def _modes(self, model: Model) -> ElasticModes:
+        return kelvinlet_modes(model, self._chosen.centres, self._chosen.radius_mm)
 
 
 def kelvinlet_modes(model: Model, count: int, radius_mm: float) -> ElasticModes:

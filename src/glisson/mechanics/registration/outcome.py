@@ -53,7 +53,7 @@ def outcome(
 
 def posterior_spread(motion: Motion, found: Fit) -> FloatArray:
     """Motion of all nodes (n, 3, size) by independent unknowns of unit variance, from the Gauss–Newton Hessian."""
-    values, vectors = np.linalg.eigh(found.data + found.prior)
+    values, vectors = np.linalg.eigh(found.hessian)
     root = vectors / np.sqrt(np.maximum(values, _LEAST_PRECISION))
     nodes = np.arange(len(motion.positions(found.state)))
     spread: FloatArray = motion.derivative(found.state, nodes) @ root

@@ -35,12 +35,11 @@ def judged(rows: Rows, cut: FloatArray) -> Judgement:
         cut: (p,) standard deviations beyond which each point counts less and less.
     """
     count = len(cut)
+    may_lie, worth = np.zeros(count, dtype=np.bool_), np.zeros(count)
+    may_lie[rows.point], worth[rows.point] = rows.robust, rows.worth
     squares = rows.squares(count)
-    may_lie = np.bincount(rows.point, rows.robust, minlength=count) > 0.0
     share = 1.0 / (1.0 + squares / cut**2)
     beliefs = np.where(may_lie, share**2, 1.0)
-    worth = np.ones(count)
-    worth[rows.point] = rows.worth
     cost = 0.5 * float(worth @ np.where(may_lie, squares * share, squares))
     return Judgement(beliefs, beliefs[rows.point] * rows.worth, cost)
 

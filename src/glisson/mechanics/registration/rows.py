@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
+from numpy.typing import NDArray
 
 from glisson.core.arrays import FloatArray, IntArray
 
@@ -30,7 +31,7 @@ class Rows:
     sigma_mm: FloatArray
     point: IntArray
     worth: FloatArray
-    robust: FloatArray
+    robust: NDArray[np.bool_]
 
     def some(self, chosen: IntArray) -> "Rows":
         """The rows of some numbers."""

@@ -60,11 +60,9 @@ class Seen:
     def __init__(self, model: Model, observations: Observations, model_error: ModelError) -> None:
         places = Places(model)
         self._matches: list[Match] = []
-        self._firsts: list[int] = []
-        self.count = 0
+        counts = []
         for item in (item for item in observations.items if len(item.points_mm)):
-            self._firsts.append(self.count)
-            self.count += len(item.points_mm)
+            counts.append(len(item.points_mm))
             errors = _errors(item, model_error)
             if item.kind == "landmark":
                 self._matches.append(PointMatch(item.points_mm, errors, places.landmark(item.name)))
@@ -72,11 +70,9 @@ class Seen:
                 self._matches.append(CurveMatch(item.points_mm, errors, places.curve(item.name)))
             else:
                 self._matches.append(SurfaceMatch(item.points_mm, errors, places.surface(item.name)))
-
-    @property
-    def item(self) -> IntArray:
+        self._firsts = np.cumsum([0, *counts[:-1]]).tolist()
+        self.item = np.repeat(np.arange(len(counts)), counts)
         """The number of the observation (p,) that each observed point belongs to."""
-        return np.repeat(np.arange(len(self._firsts)), np.diff([*self._firsts, self.count]))
 
     @property
     def groups(self) -> list[IntArray]:
@@ -148,7 +144,7 @@ class PointMatch:
             sigma_mm=self._sigma.ravel(),
             point=first + np.repeat(np.arange(count), 3),
             worth=np.repeat(self._worth, 3),
-            robust=np.zeros(3 * count),
+            robust=np.zeros(3 * count, dtype=np.bool_),
         )
 
 
@@ -194,7 +190,7 @@ def _along(
 ) -> Rows:  # fmt: skip
     """One row for each point, along its direction."""
     sigma = np.sqrt(np.einsum("pi,pij,pj->p", directions, errors.covariance_mm2, directions))
-    numbers, may_lie = first + np.arange(len(gaps)), np.full(len(gaps), float(robust))
+    numbers, may_lie = first + np.arange(len(gaps)), np.full(len(gaps), robust)
     return Rows(nodes, weights, directions, gaps, sigma, numbers, errors.worth, may_lie)
 
 

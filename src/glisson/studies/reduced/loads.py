@@ -5,6 +5,7 @@ millimetres. What acts is the part of the weight that its neighbours don't bear,
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -56,7 +57,7 @@ class Draw:
         return found
 
     def _grasp(self, random: np.random.Generator) -> tuple[IntArray, FloatArray]:
-        places, surface, _ = self._surface()
+        places, surface, _ = self._surface
         centre = places[random.integers(len(places))]
         spread = random.uniform(*_GRASP_MM)
         nodes_at = self.model.mesh.nodes[surface]
@@ -66,7 +67,7 @@ class Draw:
         return surface[near], (shares[near] / shares[near].sum())[:, None] * pull
 
     def _bar(self, random: np.random.Generator) -> tuple[CylinderTool, FloatArray]:
-        places, _, normals = self._surface()
+        places, _, normals = self._surface
         at = int(random.integers(len(places)))
         inward = -normals[at] + _SLANT * random.normal(size=3) / np.sqrt(2.0)
         inward /= np.linalg.norm(inward)
@@ -75,6 +76,7 @@ class Draw:
         bar = CylinderTool(Cylinder("bar", end - _SHAFT_MM * inward, end, radius))
         return bar, (depth + _CLEAR_MM) * inward
 
+    @cached_property
     def _surface(self) -> tuple[FloatArray, IntArray, FloatArray]:
         """Places (f, 3) on the surface that tools reach, surface nodes (s,), and the places' outward normals (f, 3)."""
         mesh = self.model.mesh

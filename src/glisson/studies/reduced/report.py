@@ -7,6 +7,7 @@ import numpy as np
 from glisson.core.arrays import FloatArray
 from glisson.studies.reduced.benchmark import Result
 from glisson.studies.reduced.following import UPDATES
+from glisson.studies.tables import distribution
 
 _ANCHOR = "SOFA's model reduction on the same mesh: 0.62 frames/s full, 262 reduced, without contact or a bound"
 _SAME_MM = 0.1
@@ -19,16 +20,16 @@ def values_of(result: Result) -> dict[str, Any]:
     ratios = followed.bounds_mm[own] / np.maximum(errors[own], 1e-6)
     return {
         "updates_per_s": float(1.0 / followed.seconds.mean()),
-        "error_mm": _spread(errors, worst=True),
+        "error_mm": _of_some(errors),
         "bound_violations": int((errors[own] > followed.bounds_mm[own]).sum()),
-        "effectivity": _spread(ratios, worst=False),
+        "effectivity": _of_some(ratios),
         "fallbacks": float(followed.fell_back.mean()),
         "loads": len(errors),
         "loads_without_answer": int(np.isnan(errors).sum()),
         "fallbacks_at_end": int((~own).sum()),
         "touching": float(result.touching.mean()),
-        "tip_mm": _spread(result.tip_mm, worst=True),
-        "update_ms": _spread(1e3 * followed.seconds.ravel(), worst=True),
+        "tip_mm": _of_some(result.tip_mm),
+        "update_ms": _of_some(1e3 * followed.seconds.ravel()),
         "full_seconds": float(np.median(result.full_seconds)),
         "other_branches": int((result.apart_mm > np.maximum(_SAME_MM, 2.0 * followed.bounds_mm.max())).sum()),
         "elements": result.elements,
@@ -76,8 +77,6 @@ def _times(number: float | None) -> str:
     return "an unknown share of" if number is None else f"{number:.1f} times"
 
 
-def _spread(numbers: FloatArray, worst: bool) -> dict[str, float | None]:
-    """Of the numbers that are some; None where there are none."""
-    some = numbers[np.isfinite(numbers)]
-    parts = {"median": 50.0, "p95": 95.0} | ({"worst": 100.0} if worst else {})
-    return {name: float(np.percentile(some, share)) if len(some) else None for name, share in parts.items()}
+def _of_some(numbers: FloatArray) -> dict[str, float] | None:
+    """Of those that are numbers."""
+    return distribution(numbers[np.isfinite(numbers)].tolist())
