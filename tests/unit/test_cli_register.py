@@ -33,12 +33,9 @@ def seen(case: Case, scale: float = 1.0) -> Observations:
     model = read_model(case.path(MODEL))
     nodes = model.mesh.nodes[np.unique(model.mesh.boundary()[0])]
     assert model.structures.duct is not None
-    parts = (("surface", "swab", nodes), ("curve", "wire", model.structures.duct.points_mm))
+    swab, wire = (scale * (points @ TURN.T + SHIFT) for points in (nodes, model.structures.duct.points_mm))
     return Observations(
-        tuple(
-            Observation(kind, name, scale * (points @ TURN.T + SHIFT), 0.5, "room")  # type: ignore[arg-type]
-            for kind, name, points in parts
-        )
+        (Observation("surface", "swab", swab, 0.5, "room"), Observation("curve", "wire", wire, 0.5, "room"))
     )
 
 

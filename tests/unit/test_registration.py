@@ -196,9 +196,7 @@ def test_an_incompressible_bend_is_followed_into_the_inside(model: Model) -> Non
     """A closed form that no basis of ours holds, seen all over the surface and at 120 marks of it."""
     rng = np.random.default_rng(2)
     whole = replace(model, node_sets={"upper": np.unique(model.mesh.boundary()[0])})
-    there = Bend(Frame(np.zeros(3), np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])), 220.0).forward(
-        model.mesh.nodes
-    )
+    there = Bend(Frame(np.zeros(3), np.eye(3)[:, [2, 0, 1]]), 220.0).forward(model.mesh.nodes)
     surface = np.unique(model.mesh.boundary()[0])
     corners = {f"corner {number}": [number] for number in surface[evenly_spread(model.mesh.nodes[surface], 120)]}
     whole = replace(whole, node_sets={**whole.node_sets, **corners})

@@ -21,7 +21,7 @@ from glisson.studies.meshing import member_mesh
 from glisson.studies.registration import scoring
 from glisson.studies.registration.best_rigid import of_data, of_targets
 from glisson.studies.registration.rows import Score, flat, scores, table_rows, totals
-from glisson.studies.registration.scoring import BEST, BEST_OF_DATA, NOTHING, register_case, target_errors
+from glisson.studies.registration.scoring import BEST, BEST_OF_DATA, NOTHING, target_errors, timed_registration
 from glisson.studies.registration.solving_model import make_model, model_point, read_model
 from glisson.studies.registration.study import SparseDataTwin
 from glisson.studies.registration.truths import with_its_skin
@@ -71,7 +71,9 @@ def test_the_model_is_the_organ_with_a_contours_errors(model: Model) -> None:
 def test_a_registration_that_knows_the_truth_is_off_by_its_mesh_only(model: Model) -> None:
     case = bent_case()
     bend = bend_of(case.design, build_sparse_liver(case.design.member))
-    found, milliseconds = register_case(Knowing(lambda x: case.room_from_patient.apply(bend.forward(x))), model, case)
+    found, milliseconds = timed_registration(
+        Knowing(lambda x: case.room_from_patient.apply(bend.forward(x))), model, case
+    )
     assert target_errors(found, case).max() < 1.0
     assert milliseconds > 0.0
 
@@ -79,7 +81,7 @@ def test_a_registration_that_knows_the_truth_is_off_by_its_mesh_only(model: Mode
 def test_a_registration_in_the_wrong_frame_is_not_taken_for_a_good_one(model: Model) -> None:
     case = bent_case()
     bend = bend_of(case.design, build_sparse_liver(case.design.member))
-    found, _ = register_case(Knowing(bend.forward), model, case)
+    found, _ = timed_registration(Knowing(bend.forward), model, case)
     assert target_errors(found, case).mean() > 50.0
 
 

@@ -1,6 +1,6 @@
 """How much Gauss–Newton steps are damped."""
 
-_START, _LEAST, _MOST = 1e-4, 1e-12, 1e8
+_START, _MOST = 1e-4, 1e8
 
 
 class Damping:
@@ -16,7 +16,7 @@ class Damping:
     def eased(self, gained: float, promised: float) -> None:
         """A step has lowered the cost by `gained` > 0, where the quadratic model `promised` so much."""
         kept = min(gained / max(promised, 1e-300), 2.0)
-        self.share = max(self.share * max(1.0 / 3.0, 1.0 - (2.0 * kept - 1.0) ** 3), _LEAST)
+        self.share *= max(1.0 / 3.0, 1.0 - (2.0 * kept - 1.0) ** 3)
         self._growth = 2.0
 
     def raised(self) -> bool:

@@ -40,7 +40,7 @@ def off_by(places: FloatArray, case: SparseCase) -> FloatArray:
     return errors
 
 
-def register_case(technique: Registration, model: Model, case: SparseCase) -> tuple[Registered, float]:
+def timed_registration(technique: Registration, model: Model, case: SparseCase) -> tuple[Registered, float]:
     """What a technique finds, and the milliseconds that it took."""
     started = perf_counter()
     found = technique.register(model, case.observations)
@@ -51,7 +51,7 @@ def score_technique(inputs: Mapping[str, Any], folder: Path) -> Outcome:
     """A technique by name on a case: `errors_mm` of its targets, and `milliseconds`."""
     case = build_case(CaseDesign(**inputs["case"]), folder, inputs["truth"])
     technique = make_technique("registration", inputs["technique"], inputs["parameters"], inputs["technique"])
-    found, milliseconds = register_case(technique, read_model(folder, inputs["model"]), case)
+    found, milliseconds = timed_registration(technique, read_model(folder, inputs["model"]), case)
     values = {"errors_mm": _short(target_errors(found, case)), "milliseconds": milliseconds}
     return Outcome(values, {}, found.status, found.deformation.message)
 
