@@ -12,6 +12,7 @@ from glisson.core.arrays import FloatArray
 from glisson.core.mesh import TetMesh
 from glisson.core.model import Material, Model
 from glisson.core.observations import Observation, Observations
+from glisson.core.protocols import PreparedRegistration, Registration
 from glisson.core.registered import Registered
 from glisson.core.registry import make_technique
 from glisson.core.status import Status
@@ -23,14 +24,20 @@ from glisson.mechanics.registration.fitting import _at
 from glisson.mechanics.registration.full_fit import FullFit
 from glisson.mechanics.registration.kelvinlets import kelvinlets
 from glisson.mechanics.registration.motion import BasisMotion, MotionState
+from glisson.mechanics.registration.places import Places
 from glisson.mechanics.registration.seen import ModelError, Seen
 from glisson.phantom.sparse_data.closed_form import Bend, Frame
 
 TECHNIQUES = ("rigid", "kelvinlets", "linear-basis", "free")
 
 
+def prepared(technique: str, model: Model, **values: float) -> PreparedRegistration:
+    made: Registration = make_technique("registration", technique, values, "register")
+    return made.prepare(model)
+
+
 def registered(technique: str, model: Model, observations: Observations, **values: float) -> Registered:
-    found: Registered = make_technique("registration", technique, values, "register").register(model, observations)
+    found: Registered = prepared(technique, model, **values).register(observations)
     return found
 
 
@@ -89,7 +96,7 @@ def test_derivatives_of_the_cost_are_those_of_differences(model: Model) -> None:
         Observation("landmark", "tip", model.mesh.nodes[model.node_set("tip")].mean(axis=0)[None] + 3.0, 1.0),
         Observation("curve", "wire", duct.points_mm[2:9] + [0.0, 2.0, 1.0], 1.0),
     )
-    seen = Seen(model, Observations(items), ModelError(0.5, 1e-6))
+    seen = Seen(Places(model), Observations(items), ModelError(0.5, 1e-6))
     state = motion.moved(motion.at_rest(), 0.8 * rng.normal(size=motion.size))
     full = FullFit(model, seen, 50.0)
     cut = np.full(len(seen.item), 9.0)
@@ -185,8 +192,7 @@ def test_a_deformation_of_the_basis_is_found(model: Model) -> None:
     whole = replace(model, node_sets={"upper": np.unique(model.mesh.boundary()[0])})
     items = tuple(replace(seen_surface(whole, there, rng, 0.0, count=3000), sigma_mm=0.05) for _ in range(1))
     values = {"controls": 20, "strain": 10.0, "model_error_mm": 0.01}
-    technique = make_technique("registration", "linear-basis", values, "register")
-    found = technique.register(whole, Observations(items))
+    found = registered("linear-basis", whole, Observations(items), **values)
     rigid = registered("rigid", whole, Observations(items))
     off, stiff = (np.linalg.norm(one.positions_mm - there, axis=1).mean() for one in (found, rigid))
     assert off < 0.1 * stiff

@@ -51,11 +51,16 @@ class Knowing:
     """A registration that moves the nodes as it was told, whatever is seen."""
 
     carry: Any
+    model: Any = None
 
-    def register(self, model: Model, observations: Observations) -> Registered:
-        stage = StageResult("registration", self.carry(model.mesh.nodes) - model.mesh.nodes, Status.CONVERGED)
-        found = Deformation(model.mesh, (stage,), Status.CONVERGED, "")
-        return Registered(found, observations.frame, np.zeros((*model.mesh.nodes.shape, 1)))
+    def prepare(self, model: Model) -> "Knowing":
+        return Knowing(self.carry, model)
+
+    def register(self, observations: Observations) -> Registered:
+        mesh = self.model.mesh
+        stage = StageResult("registration", self.carry(mesh.nodes) - mesh.nodes, Status.CONVERGED)
+        found = Deformation(mesh, (stage,), Status.CONVERGED, "")
+        return Registered(found, observations.frame, np.zeros((*mesh.nodes.shape, 1)))
 
 
 def test_the_model_is_the_organ_with_a_contours_errors(model: Model) -> None:

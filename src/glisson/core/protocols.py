@@ -204,19 +204,40 @@ class Solver(Technique, Protocol):
         """Deformation through all stages; a solve that fails is told by its status, not by an exception."""
 
 
-class Registration(Technique, Protocol):
-    """Deforms a model to fit what was seen (entry-point group `glisson.registrations`)."""
+class PreparedRegistration(Protocol):
+    """A model that is ready to be fitted to what is seen, again and again."""
 
-    def register(self, model: Model, observations: Observations, progress: Progress = silent) -> Registered:
+    def register(
+        self, observations: Observations, last: Registered | None = None, progress: Progress = silent
+    ) -> Registered:
         """The model as the observations have it; what they do not determine is told by the status.
 
         Args:
-            model: in its scanned shape.
             observations: in the frame "patient", or in another of which nothing is known.
+            last: an answer to begin from; without it the organ is looked for everywhere.
             progress: told how far it is.
 
         Raises:
-            BadInput: the observations cannot be of this model.
+            BadInput: the observations cannot be of this model, or `last` is not.
+            StageFailed: the organ does not come to rest on what was seen.
+        """
+
+
+class Registration(Technique, Protocol):
+    """Deforms a model to fit what was seen (entry-point group `glisson.registrations`)."""
+
+    def prepare(
+        self, model: Model, scenario: Scenario | None = None, progress: Progress = silent
+    ) -> PreparedRegistration:
+        """What is done once, before surgery.
+
+        Args:
+            model: in its scanned shape.
+            scenario: what is planned to be done to the organ; only some techniques need it.
+            progress: told how far it is.
+
+        Raises:
+            BadInput: the model, or the scenario, is not what the technique needs.
         """
 
 

@@ -14,7 +14,7 @@ from glisson.core.protocols import Progress, silent
 from glisson.core.registered import Registered
 from glisson.core.registry import make_technique
 from glisson.core.structures import Tumour
-from glisson.framework.case import MODEL, OBSERVATIONS, RESULTS, Case
+from glisson.framework.case import MODEL, OBSERVATIONS, RESULTS, SCENARIO, Case
 from glisson.framework.lock import exclusive
 from glisson.geometry.location import PointLocator
 from glisson.io.atomic import atomic_folder
@@ -22,6 +22,7 @@ from glisson.io.deformation_files import write_deformation
 from glisson.io.model_files import read_model
 from glisson.io.observation_files import read_observations
 from glisson.io.records import write_json
+from glisson.io.scenario_files import read_scenario
 
 LINEAR_BASIS = "linear-basis"
 REGISTERED = f"{RESULTS}/registered"
@@ -74,7 +75,9 @@ def register_case(
     case.check_writable()
     made = make_technique("registration", technique, parameters or {}, "register")
     model = read_model(case.path(MODEL))
-    found: Registered = made.register(model, read_observations(observations or case.path(OBSERVATIONS)), progress)
+    scenario = read_scenario(case.path(SCENARIO)) if case.has(SCENARIO) else None
+    seen = read_observations(observations or case.path(OBSERVATIONS))
+    found: Registered = made.prepare(model, scenario, progress).register(seen, None, progress)
     tumours = tuple(_now(tumour, found) for tumour in model.structures.tumours)
     values = _values(found, tumours) | {"technique": technique}
     with exclusive(case.folder), atomic_folder(case.path(REGISTERED)) as folder:

@@ -3,12 +3,13 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
+from glisson.core.arrays import FloatArray
 from glisson.core.model import Model
 from glisson.core.parameters import parameter
 from glisson.mechanics.registration.elastic_parameters import ElasticParameters
-from glisson.mechanics.registration.elastic_technique import Deformed, ElasticTechnique
+from glisson.mechanics.registration.elastic_technique import ElasticTechnique
 from glisson.mechanics.registration.full_fit import FullFit
-from glisson.mechanics.registration.motion import BasisMotion, MotionState
+from glisson.mechanics.registration.prepared import Deformed
 from glisson.mechanics.registration.seen import Seen
 
 
@@ -27,10 +28,29 @@ class Free(ElasticTechnique):
     Parameters: ClassVar[type[FreeParameters]] = FreeParameters
     _chosen: FreeParameters
 
-    def _deformed(self, model: Model, seen: Seen, place: MotionState, energy_uj: float) -> Deformed:
-        full = FullFit(model, seen, energy_uj)
+    def _body(self, model: Model, energy_uj: float) -> "FreeBody":
+        return FreeBody(model, energy_uj, self._chosen.modes)
+
+
+@dataclass(frozen=True, eq=False)
+class FreeBody:
+    """A body of which every node may move.
+
+    Args:
+        model: the organ.
+        energy_uj: see `FullFit`.
+        modes: how many of the least certain ways to move are told.
+    """
+
+    model: Model
+    energy_uj: float
+    modes: int
+
+    def fitted(self, seen: Seen, start: FloatArray) -> Deformed:
+        """See `Deformable`."""
+        full = FullFit(self.model, seen, self.energy_uj)
         try:
-            found = full.fit(BasisMotion(model.mesh.nodes).positions(place))
-            return Deformed(found.positions, full.posterior_spread(found, self._chosen.modes), found.beliefs)
+            found = full.fit(start)
+            return Deformed(found.positions, full.posterior_spread(found, self.modes), found.beliefs)
         finally:
             full.close()

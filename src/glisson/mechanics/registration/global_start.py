@@ -11,7 +11,6 @@ from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from glisson.core.arrays import FloatArray
-from glisson.core.model import Model
 from glisson.core.observations import Observation, Observations
 from glisson.geometry.rotations import nearest_rotation
 from glisson.geometry.spreading import evenly_spread
@@ -43,11 +42,10 @@ class _Part:
     weight: float
 
 
-def rigid_starts(model: Model, observations: Observations) -> list[RigidStart]:
+def rigid_starts(places: Places, observations: Observations) -> list[RigidStart]:
     """The best distinct places of the organ, the best first."""
-    places = Places(model)
-    parts = [_part(item, places, model.mesh.nodes) for item in observations.items if len(item.points_mm)]
-    middles = model.mesh.nodes[:: max(len(model.mesh.nodes) // 4000, 1)]
+    parts = [_part(item, places) for item in observations.items if len(item.points_mm)]
+    middles = places.nodes[:: max(len(places.nodes) // 4000, 1)]
     rotations, shifts = _starts(parts)
     for iterations, scale, kept in _ROUNDS:
         for _ in range(iterations):
@@ -64,7 +62,8 @@ def rigid_starts(model: Model, observations: Observations) -> list[RigidStart]:
     return found
 
 
-def _part(item: Observation, places: Places, nodes: FloatArray) -> _Part:
+def _part(item: Observation, places: Places) -> _Part:
+    nodes = places.nodes
     seen = item.points_mm[evenly_spread(item.points_mm, _POINTS)]
     if item.kind == "landmark":
         model = places.landmark(item.name).at(nodes)

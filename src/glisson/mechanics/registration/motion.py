@@ -7,6 +7,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from glisson.core.arrays import FloatArray, IntArray
+from glisson.geometry.rotations import nearest_rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +60,15 @@ class BasisMotion:
     def at_rest(self) -> MotionState:
         """Where the scan was taken."""
         return MotionState(np.eye(3), np.zeros(3), np.zeros(self.size - 6))
+
+    def nearest(self, positions: FloatArray) -> MotionState:
+        """A state whose nodes are at some positions (n, 3), or near: turned as fits best, then deformed."""
+        arms, middle = self.nodes - self.middle_mm, positions.mean(axis=0)
+        rotation = nearest_rotation((positions - middle).T @ arms)
+        left = (positions - middle) @ rotation - arms
+        flat = self.basis.reshape(self.nodes.size, self.size - 6)
+        amounts: FloatArray = np.linalg.solve(flat.T @ flat, flat.T @ left.ravel())
+        return MotionState(rotation, middle - self.middle_mm, amounts)
 
     def positions(self, state: MotionState) -> FloatArray:
         """See `Motion`."""

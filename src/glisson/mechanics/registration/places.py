@@ -36,7 +36,7 @@ class Places:
     """Looks up parts of a model by the name that an observation gives."""
 
     def __init__(self, model: Model) -> None:
-        self._model = model
+        self._model, self.nodes = model, model.mesh.nodes
         self._locator = PointLocator(model.mesh)
         self._triangles, _ = straight_boundary(model.mesh)
 

@@ -4,12 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from glisson.core.arrays import FloatArray
 from glisson.core.errors import StageFailed
-from glisson.core.model import Model
 from glisson.core.observations import Observations
-from glisson.mechanics.registration.fitting import Fit, fit
+from glisson.mechanics.registration.fitting import fit
 from glisson.mechanics.registration.global_start import rigid_starts
 from glisson.mechanics.registration.motion import BasisMotion, MotionState
+from glisson.mechanics.registration.places import Places
 from glisson.mechanics.registration.seen import ModelError, Seen
 
 RIGID_ERROR = ModelError(3.0, 25.0)
@@ -22,31 +23,33 @@ _APART_MM = 10.0
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """The best place, and a sentence where another one, some way off, is nearly as good."""
+    """Nodes (n, 3) at the best place, and a sentence where another one, some way off, is nearly as good."""
 
-    fit: Fit
+    positions: FloatArray
     ambiguous: str | None
 
 
-def placed(model: Model, observations: Observations, seen: Seen, motion: BasisMotion) -> Placed:
+def placed(places: Places, observations: Observations) -> Placed:
     """The rigid motion of least cost of several starts.
 
     Raises:
         StageFailed: none comes to rest.
     """
-    fits: list[Fit] = []
-    for start in rigid_starts(model, observations)[:_REFINED]:
+    motion, seen = BasisMotion(places.nodes), Seen(places, observations, RIGID_ERROR)
+    fits: list[tuple[float, FloatArray]] = []
+    for start in rigid_starts(places, observations)[:_REFINED]:
         try:
             shift = start.rotation @ motion.middle_mm + start.translation_mm - motion.middle_mm
-            fits.append(fit(motion, seen, MotionState(start.rotation, shift, np.zeros(0))))
+            found = fit(motion, seen, MotionState(start.rotation, shift, np.zeros(0)))
+            fits.append((found.cost, motion.positions(found.state)))
         except StageFailed as failure:
             last = failure
     if not fits:
         raise last
-    fits.sort(key=lambda found: found.cost)
-    best = motion.positions(fits[0].state)
-    for other in fits[1:]:
-        apart = float(np.linalg.norm(motion.positions(other.state) - best, axis=1).mean())
-        if other.cost < _AS_GOOD * fits[0].cost and apart > _APART_MM:
-            return Placed(fits[0], f"Another place of the organ, {apart:.0f} mm off, explains what was seen as well.")
-    return Placed(fits[0], None)
+    fits.sort(key=lambda found: found[0])
+    least, best = fits[0]
+    for cost, other in fits[1:]:
+        apart = float(np.linalg.norm(other - best, axis=1).mean())
+        if cost < _AS_GOOD * least and apart > _APART_MM:
+            return Placed(best, f"Another place of the organ, {apart:.0f} mm off, explains what was seen as well.")
+    return Placed(best, None)

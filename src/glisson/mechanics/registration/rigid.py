@@ -4,16 +4,14 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from glisson.core.model import Model
-from glisson.core.observations import Observations
 from glisson.core.parameters import parameter
 from glisson.core.protocols import Progress, silent
-from glisson.core.registered import Registered
-from glisson.mechanics.registration.checks import check_observations
+from glisson.core.scenario import Scenario
 from glisson.mechanics.registration.elastic_parameters import ERROR_HELP, LENGTH_HELP
 from glisson.mechanics.registration.motion import BasisMotion
-from glisson.mechanics.registration.outcome import outcome, posterior_spread
-from glisson.mechanics.registration.placing import RIGID_ERROR, placed
-from glisson.mechanics.registration.seen import ModelError, Seen
+from glisson.mechanics.registration.placing import RIGID_ERROR
+from glisson.mechanics.registration.prepared import MovedBody, Prepared
+from glisson.mechanics.registration.seen import ModelError
 
 
 @dataclass(frozen=True)
@@ -39,12 +37,7 @@ class Rigid:
         """Nothing beyond the core."""
         return ()
 
-    def register(self, model: Model, observations: Observations, progress: Progress = silent) -> Registered:
+    def prepare(self, model: Model, scenario: Scenario | None = None, progress: Progress = silent) -> Prepared:
         """See `Registration`."""
-        check_observations(model, observations)
-        progress(None, "placing the organ")
         error = ModelError(self._parameters.model_error_mm, self._parameters.model_error_length_mm)
-        motion = BasisMotion(model.mesh.nodes)
-        found = placed(model, observations, Seen(model, observations, error), motion)
-        positions, spread = motion.positions(found.fit.state), posterior_spread(motion, found.fit)
-        return outcome(model, observations.frame, positions, spread, found.fit.beliefs, found.ambiguous)
+        return Prepared(model, error, MovedBody(BasisMotion(model.mesh.nodes)))

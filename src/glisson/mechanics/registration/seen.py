@@ -7,7 +7,6 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from glisson.core.arrays import FloatArray, IntArray
-from glisson.core.model import Model
 from glisson.core.observations import Observation, Observations
 from glisson.geometry.distance import SurfaceTree
 from glisson.mechanics.registration.places import MaterialCurve, MaterialPoints, Places
@@ -52,13 +51,12 @@ class Seen:
     """All that was seen.
 
     Args:
-        model: the organ.
+        places: of the organ.
         observations: in any frame.
         model_error: is added to each point's own.
     """
 
-    def __init__(self, model: Model, observations: Observations, model_error: ModelError) -> None:
-        places = Places(model)
+    def __init__(self, places: Places, observations: Observations, model_error: ModelError) -> None:
         self._matches: list[Match] = []
         counts = []
         for item in (item for item in observations.items if len(item.points_mm)):

@@ -43,7 +43,7 @@ def off_by(places: FloatArray, case: SparseCase) -> FloatArray:
 def timed_registration(technique: Registration, model: Model, case: SparseCase) -> tuple[Registered, float]:
     """What a technique finds, and the milliseconds that it took."""
     started = perf_counter()
-    found = technique.register(model, case.observations)
+    found = technique.prepare(model).register(case.observations)
     return found, 1000.0 * (perf_counter() - started)
 
 

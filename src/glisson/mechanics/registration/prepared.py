@@ -1,0 +1,82 @@
+"""What all techniques share that move the organ by least squares: looked for everywhere, then moved from there."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from glisson.core.arrays import FloatArray
+from glisson.core.errors import BadInput
+from glisson.core.model import Model
+from glisson.core.observations import Observations
+from glisson.core.protocols import Progress, silent
+from glisson.core.registered import Registered
+from glisson.mechanics.registration.checks import check_observations
+from glisson.mechanics.registration.fitting import fit
+from glisson.mechanics.registration.motion import BasisMotion
+from glisson.mechanics.registration.outcome import outcome, posterior_spread
+from glisson.mechanics.registration.places import Places
+from glisson.mechanics.registration.placing import placed
+from glisson.mechanics.registration.seen import ModelError, Seen
+
+
+@dataclass(frozen=True, eq=False)
+class Deformed:
+    """Nodes (n, 3) now, their posterior spread (n, 3, k), and how far each observed point is believed (p,)."""
+
+    positions: FloatArray
+    spread_mm: FloatArray
+    beliefs: FloatArray
+
+
+class Deformable(Protocol):
+    """A body that can be fitted to what was seen."""
+
+    def fitted(self, seen: Seen, start: FloatArray) -> Deformed:
+        """The body at the least cost near to node positions (n, 3)."""
+
+
+class Prepared:
+    """A body, ready to be registered; see `PreparedRegistration`."""
+
+    def __init__(self, model: Model, error: ModelError, body: Deformable) -> None:
+        self._model, self._error, self._body = model, error, body
+        self._places = Places(model)
+
+    def register(
+        self, observations: Observations, last: Registered | None = None, progress: Progress = silent
+    ) -> Registered:
+        """See `PreparedRegistration`."""
+        check_observations(self._model, observations)
+        seen, ambiguous = Seen(self._places, observations, self._error), None
+        if last is None:
+            progress(0.0, "placing the organ")
+            place = placed(self._places, observations)
+            start, ambiguous = place.positions, place.ambiguous
+        else:
+            start = self._checked(last, observations)
+        progress(0.4, "deforming the organ")
+        found = self._body.fitted(seen, start)
+        return outcome(self._model, observations.frame, found.positions, found.spread_mm, found.beliefs, ambiguous)
+
+    def _checked(self, last: Registered, observations: Observations) -> FloatArray:
+        if not np.array_equal(last.deformation.mesh.nodes, self._model.mesh.nodes):
+            raise BadInput("The last answer is of another model; begin without it.")
+        if last.frame != observations.frame:
+            raise BadInput(
+                f"The last answer is in the frame {last.frame!r} and the observations in {observations.frame!r}."
+            )
+        return last.positions_mm
+
+
+class MovedBody:
+    """A body that moves by a basis."""
+
+    def __init__(self, motion: BasisMotion) -> None:
+        self._motion = motion
+
+    def fitted(self, seen: Seen, start: FloatArray) -> Deformed:
+        """See `Deformable`."""
+        motion = self._motion
+        found = fit(motion, seen, motion.nearest(start))
+        return Deformed(motion.positions(found.state), posterior_spread(motion, found), found.beliefs)
