@@ -9,19 +9,25 @@ from glisson.cli.console import Answer
 from glisson.cli.options import add_case
 from glisson.cli.progress import StageLines
 from glisson.core.registry import list_techniques, technique_class
+from glisson.core.units import place_text
 from glisson.framework.case import open_case
 from glisson.framework.registering import LINEAR_BASIS, RegisteredCase, register_case
 
 _KEYS = (
-    "status", "message", "technique", "frame", "unobserved", "set_aside", "sigma_mm", "tumours", "notes", "folder",
-    "seconds",
+    "status", "message", "technique", "frame", "unobserved", "set_aside", "sigma_mm", "tumours", "time_s", "moved_mm",
+    "jumped", "notes", "frames", "folder", "seconds",
 )  # fmt: skip
 
 
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case(parser)
     parser.add_argument(
-        "--observations", metavar="FILE", help="what was seen (see docs/registration.md); default the case's own"
+        "--observations",
+        metavar="FILE",
+        nargs="+",
+        default=(),
+        help="what was seen (see docs/registration.md), several files for frames one after another; default the "
+        "case's own",
     )
     parser.add_argument(
         "--technique", metavar="NAME", default=LINEAR_BASIS, help=f"see glisson techniques; by default {LINEAR_BASIS}"
@@ -56,11 +62,15 @@ def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
 def _text(made: RegisteredCase) -> str:
     values = made.values
     told = [f"status      {values['message']}"]
-    for tumour in made.tumours:
-        x, y, z = tumour.after_mm
+    if len(values["frames"]) > 1:
+        told += [
+            f"{frame['time_s']:8.2f} s  {frame['status']}, moved by {frame['moved_mm']:.1f} mm"
+            for frame in values["frames"]
+        ]
+    for tumour in values["tumours"]:
         told.append(
-            f"{tumour.name:11} now at {x:.1f}, {y:.1f}, {z:.1f} mm ({made.found.frame}), within "
-            f"{tumour.radius95_mm:.1f} mm by 95 %"
+            f"{tumour['name']:11} now at {place_text(tumour['after_mm'])} ({made.found.frame}), within "
+            f"{tumour['radius95_mm']:.1f} mm by 95 %"
         )
     told.append(f"elsewhere   known to {values['sigma_mm']:.1f} mm (one standard deviation, median of the nodes)")
     if made.found.set_aside > 0.0:
@@ -73,6 +83,7 @@ COMMAND = Command(
     "register",
     "  glisson register liver\n"
     "  glisson register liver --observations swab.json --technique free\n"
+    "  glisson register liver --observations frame-1.json frame-2.json frame-3.json\n"
     "  glisson register liver --strain 0.05 --json",
     _add_arguments,
     _run,

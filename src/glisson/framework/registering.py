@@ -1,6 +1,6 @@
-"""The model of a case, registered to what was seen during surgery."""
+"""The model of a case, registered to what was seen during surgery, frame by frame."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
-from glisson.core.arrays import FloatArray
 from glisson.core.errors import BadInput
 from glisson.core.protocols import Progress, silent
 from glisson.core.registered import Registered
@@ -23,35 +22,25 @@ from glisson.io.model_files import read_model
 from glisson.io.observation_files import read_observations
 from glisson.io.records import write_json
 from glisson.io.scenario_files import read_scenario
+from glisson.mechanics.registration.following import Followed, Following
 
 LINEAR_BASIS = "linear-basis"
 REGISTERED = f"{RESULTS}/registered"
 _ANSWER = "registration.json"
 
 
-@dataclass(frozen=True)
-class TumourNow:
-    """A tumour's centroid in the scan and in the observations' frame, and the radius that holds it by 95 %, mm."""
-
-    name: str
-    before_mm: tuple[float, float, float]
-    after_mm: tuple[float, float, float]
-    radius95_mm: float
-
-
 @dataclass(frozen=True, eq=False)
 class RegisteredCase:
-    """The answer, the tumours by it, all of it in plain `values`, and the folder in which it was written."""
+    """The answer of the last frame, all of it and of each frame in plain `values`, and the folder where it lies."""
 
     found: Registered
-    tumours: tuple[TumourNow, ...]
     values: dict[str, Any]
     folder: Path
 
 
 def register_case(
     case: Case,
-    observations: str | Path | None = None,
+    observations: Sequence[str | Path] = (),
     technique: str = LINEAR_BASIS,
     parameters: Mapping[str, Any] | None = None,
     progress: Progress = silent,
@@ -60,7 +49,8 @@ def register_case(
 
     Args:
         case: with a model (`glisson mesh`).
-        observations: the file of what was seen; by default the case's own `observations.json`.
+        observations: the file of what was seen, several for frames one after another; by default the case's own
+            `observations.json`.
         technique: of the kind registration.
         parameters: of the technique.
         progress: told how far it is.
@@ -76,17 +66,28 @@ def register_case(
     made = make_technique("registration", technique, parameters or {}, "register")
     model = read_model(case.path(MODEL))
     scenario = read_scenario(case.path(SCENARIO)) if case.has(SCENARIO) else None
-    seen = read_observations(observations or case.path(OBSERVATIONS))
-    found: Registered = made.prepare(model, scenario, progress).register(seen, None, progress)
-    tumours = tuple(_now(tumour, found) for tumour in model.structures.tumours)
-    values = _values(found, tumours) | {"technique": technique}
+    files = [Path(file) for file in observations] or [case.path(OBSERVATIONS)]
+    seen = [read_observations(file) for file in files]
+    if not any(len(item.points_mm) for one in seen for item in one.items):
+        raise BadInput(f"{files[0]} holds no observations; give surface points, landmarks, curves or contacts.")
+    following = Following(model, made.prepare(model, scenario, progress))
+    frames = []
+    for number, (file, one) in enumerate(zip(files, seen, strict=True)):
+        progress(number / len(files), f"frame {number + 1} of {len(files)}" if len(files) > 1 else "fitting")
+        try:
+            frames.append(following.next(one))
+        except BadInput as refused:
+            raise BadInput(f"{file}: {refused}") from None
+    told = [_values(frame, model.structures.tumours) for frame in frames]
+    values = told[-1] | {"technique": technique, "frames": told}
     with exclusive(case.folder), atomic_folder(case.path(REGISTERED)) as folder:
-        write_deformation(folder, found.deformation)
+        write_deformation(folder, frames[-1].found.deformation)
         write_json(folder / _ANSWER, values)
-    return RegisteredCase(found, tumours, values, case.path(REGISTERED))
+    return RegisteredCase(frames[-1].found, values, case.path(REGISTERED))
 
 
-def _values(found: Registered, tumours: tuple[TumourNow, ...]) -> dict[str, Any]:
+def _values(answer: Followed, tumours: Iterable[Tumour]) -> dict[str, Any]:
+    found = answer.found
     nodes = np.arange(len(found.spread_mm))[:, None]
     largest = np.linalg.eigvalsh(found.covariance(nodes, np.ones(nodes.shape)))[:, -1]
     return {
@@ -96,21 +97,24 @@ def _values(found: Registered, tumours: tuple[TumourNow, ...]) -> dict[str, Any]
         "unobserved": list(found.unobserved),
         "set_aside": found.set_aside,
         "sigma_mm": float(np.sqrt(np.median(largest))),
-        "tumours": [vars(tumour) for tumour in tumours],
+        "tumours": [_now(tumour, found) for tumour in tumours],
+        "time_s": answer.time_s,
+        "moved_mm": answer.moved_mm,
+        "jumped": answer.jumped,
         "notes": list(found.notes),
     }
 
 
-def _now(tumour: Tumour, found: Registered) -> TumourNow:
+def _now(tumour: Tumour, found: Registered) -> dict[str, Any]:
+    """A tumour's centroid in the scan and in the observations' frame, and the radius that holds it by 95 %, mm."""
     mesh, before = found.deformation.mesh, tumour.centroid_mm
     locator = PointLocator(mesh)
     location = locator.locate(before)
     after = locator.interpolate(location, found.positions_mm)[0]
     covariance = found.covariance(mesh.tetrahedra[location.elements], locator.weights(location))[0]
-    radius = float(np.sqrt(chi2.ppf(0.95, 3) * np.linalg.eigvalsh(covariance)[-1]))
-    return TumourNow(tumour.name, _three(before), _three(after), radius)
-
-
-def _three(point: FloatArray) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in point)
-    return x, y, z
+    return {
+        "name": tumour.name,
+        "before_mm": before.tolist(),
+        "after_mm": after.tolist(),
+        "radius95_mm": float(np.sqrt(chi2.ppf(0.95, 3) * np.linalg.eigvalsh(covariance)[-1])),
+    }

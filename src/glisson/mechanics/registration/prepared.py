@@ -12,6 +12,7 @@ from glisson.core.observations import Observations
 from glisson.core.protocols import Progress, silent
 from glisson.core.registered import Registered
 from glisson.mechanics.registration.checks import check_observations
+from glisson.mechanics.registration.contradictions import contradiction, misfits
 from glisson.mechanics.registration.fitting import fit
 from glisson.mechanics.registration.motion import BasisMotion
 from glisson.mechanics.registration.outcome import outcome, posterior_spread
@@ -48,7 +49,7 @@ class Prepared:
     ) -> Registered:
         """See `PreparedRegistration`."""
         check_observations(self._model, observations)
-        seen, ambiguous = Seen(self._places, observations, self._error), None
+        ambiguous = None
         if last is None:
             progress(0.0, "placing the organ")
             place = placed(self._places, observations)
@@ -56,8 +57,19 @@ class Prepared:
         else:
             start = self._checked(last, observations)
         progress(0.4, "deforming the organ")
+        found, off = self._fitted(observations, start)
+        doubt = contradiction(observations, off, self._fits) or ambiguous
+        return outcome(self._model, observations.frame, found.positions, found.spread_mm, found.beliefs, doubt)
+
+    def _fitted(self, observations: Observations, start: FloatArray) -> tuple[Deformed, tuple[str, ...]]:
+        """The body fitted, and what does not fit."""
+        seen = Seen(self._places, observations, self._error)
         found = self._body.fitted(seen, start)
-        return outcome(self._model, observations.frame, found.positions, found.spread_mm, found.beliefs, ambiguous)
+        return found, misfits(seen, seen.rows(found.positions))
+
+    def _fits(self, observations: Observations) -> bool:
+        _, off = self._fitted(observations, placed(self._places, observations).positions)
+        return not off
 
     def _checked(self, last: Registered, observations: Observations) -> FloatArray:
         if not np.array_equal(last.deformation.mesh.nodes, self._model.mesh.nodes):

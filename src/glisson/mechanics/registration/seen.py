@@ -68,6 +68,8 @@ class Seen:
                 self._matches.append(CurveMatch(item.points_mm, errors, places.curve(item.name)))
             else:
                 self._matches.append(SurfaceMatch(item.points_mm, errors, places.surface(item.name)))
+        self.labels = [f"{item.kind} {item.name!r}" for item in observations.items if len(item.points_mm)]
+        """What each observation is called."""
         self._firsts = np.cumsum([0, *counts[:-1]]).tolist()
         self.item = np.repeat(np.arange(len(counts)), counts)
         """The number of the observation (p,) that each observed point belongs to."""

@@ -1,0 +1,60 @@
+"""Observations that cannot be true together, or not of this organ."""
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.stats import chi2
+
+from glisson.core.errors import StageFailed
+from glisson.core.observations import Observations
+from glisson.mechanics.registration.rows import Rows
+from glisson.mechanics.registration.seen import Seen
+
+_DOUBTED = 3.0
+"""How many times further off than expected, in its median point, an observation is that does not fit."""
+
+
+def misfits(seen: Seen, rows: Rows) -> tuple[str, ...]:
+    """What does not fit where the organ has come to rest, each with how far it is off.
+
+    Args:
+        seen: all that was seen.
+        rows: of it, there.
+    """
+    count = len(seen.item)
+    squares, gaps = rows.squares(count), np.zeros(count)
+    np.add.at(gaps, rows.point, rows.gaps_mm**2)
+    told = []
+    for number, label in enumerate(seen.labels):
+        mine = seen.item == number
+        expected = chi2.median(max(np.bincount(rows.point, minlength=count)[mine].min(), 1))
+        if np.median(squares[mine]) > _DOUBTED**2 * expected:
+            told.append(f"{label} by {np.sqrt(np.median(gaps[mine])):.0f} mm")
+    return tuple(told)
+
+
+def contradiction(observations: Observations, off: tuple[str, ...], fits: Callable[[Observations], bool]) -> str | None:
+    """A sentence on what does not fit, and without which observation the rest does.
+
+    Args:
+        observations: all.
+        off: what does not fit; see `misfits`.
+        fits: whether some of them fit together.
+    """
+    if not off:
+        return None
+    items = [item for item in observations.items if len(item.points_mm)]
+    liars = [item for item in items if _fits_without(observations, item, fits)] if len(items) > 1 else []
+    sentence = f"What was seen does not fit together: {', '.join(off)} off after the best fit."
+    if liars:
+        names = " or ".join(f"{item.kind} {item.name!r}" for item in liars)
+        return f"{sentence} Without {names} the rest fits."
+    return f"{sentence} Is it of this organ?"
+
+
+def _fits_without(observations: Observations, item: object, fits: Callable[[Observations], bool]) -> bool:
+    rest = Observations(tuple(other for other in observations.items if other is not item))
+    try:
+        return fits(rest)
+    except StageFailed:
+        return False
