@@ -1,6 +1,7 @@
 """`glisson register` on the small case: where the tumour is after a known motion, and what is refused."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -65,3 +66,20 @@ def test_what_cannot_be_registered_is_refused(case: Case, glisson: Glisson, tmp_
     assert code == 2
     assert "strain" in said["message"]
     assert not case.has("results/registered")
+
+
+def test_frames_follow_one_another(case: Case, glisson: Glisson, tmp_path: Path) -> None:
+    files = []
+    for number, shift in enumerate((0.0, 3.0)):
+        items = tuple(replace(i, points_mm=i.points_mm + shift, time_s=float(number)) for i in seen(case).items)
+        files.append(tmp_path / f"frame-{number}.json")
+        write_observations(files[-1], Observations(items))
+    code, said = glisson("register", case.folder, "--technique", "rigid", "--observations", *files)
+    assert code == 0, said
+    assert [frame["time_s"] for frame in said["frames"]] == [0.0, 1.0]
+    assert said["moved_mm"] == pytest.approx(3.0 * np.sqrt(3.0), abs=0.2)
+    assert not said["jumped"]
+    write_observations(files[0], Observations(()))
+    code, said = glisson("register", case.folder, "--observations", files[0])
+    assert code == 2
+    assert "holds no observations" in said["message"]
