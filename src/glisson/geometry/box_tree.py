@@ -72,6 +72,30 @@ def _build(
     return node_lower[:used], node_upper[:used], left[:used], first[:used], size[:used], order
 
 
+def refitted(tree: BoxTree, lower: FloatArray, upper: FloatArray) -> BoxTree:
+    """The tree with its boxes around bodies that have moved: now `lower` and `upper`, each (n, 3) in mm."""
+    boxes = _refitted(tree.left, tree.first, tree.size, tree.order, lower, upper)
+    return tree._replace(lower=boxes[0], upper=boxes[1])
+
+
+@compiled
+def _refitted(
+    left: IntArray, first: IntArray, size: IntArray, order: IntArray, lower: FloatArray, upper: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    node_lower, node_upper = np.full((len(left), 3), np.inf), np.full((len(left), 3), -np.inf)
+    for node in range(len(left) - 1, -1, -1):  # children come after their parent
+        for axis in range(3):
+            if left[node] >= 0:
+                one, other = left[node], left[node] + 1
+                node_lower[node, axis] = min(node_lower[one, axis], node_lower[other, axis])
+                node_upper[node, axis] = max(node_upper[one, axis], node_upper[other, axis])
+                continue
+            for slot in range(first[node], first[node] + size[node]):
+                node_lower[node, axis] = min(node_lower[node, axis], lower[order[slot], axis])
+                node_upper[node, axis] = max(node_upper[node, axis], upper[order[slot], axis])
+    return node_lower, node_upper
+
+
 @compiled
 def squared_distance_to_box(point: FloatArray, lower: FloatArray, upper: FloatArray) -> float:
     """Squared distance (mm²) of a point (3,) to a box with corners (3,); 0 inside."""

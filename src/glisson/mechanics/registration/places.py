@@ -7,6 +7,7 @@ import numpy as np
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.errors import BadInput
 from glisson.core.model import Model
+from glisson.geometry.distance import SurfaceTree
 from glisson.geometry.location import PointLocator
 from glisson.geometry.quadratic import straight_boundary
 
@@ -39,6 +40,13 @@ class Places:
         self._model, self.nodes = model, model.mesh.nodes
         self._locator = PointLocator(model.mesh)
         self._triangles, _ = straight_boundary(model.mesh)
+        self._trees: dict[str, SurfaceTree] = {}
+
+    def tree(self, name: str) -> SurfaceTree:
+        """The `surface` of that name in its scanned shape, ready to be moved."""
+        if name not in self._trees:
+            self._trees[name] = SurfaceTree(self.nodes, self.surface(name))
+        return self._trees[name]
 
     def surface(self, name: str) -> IntArray:
         """Triangles (f, 3) in node numbers: of the node set of that name, else all of the surface."""

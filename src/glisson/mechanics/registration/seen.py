@@ -67,7 +67,7 @@ class Seen:
             elif item.kind == "curve":
                 self._matches.append(CurveMatch(item.points_mm, errors, places.curve(item.name)))
             else:
-                self._matches.append(SurfaceMatch(item.points_mm, errors, places.surface(item.name)))
+                self._matches.append(SurfaceMatch(item.points_mm, errors, places.tree(item.name)))
         self.labels = [f"{item.kind} {item.name!r}" for item in observations.items if len(item.points_mm)]
         """What each observation is called."""
         self._firsts = np.cumsum([0, *counts[:-1]]).tolist()
@@ -88,14 +88,14 @@ class Seen:
 class SurfaceMatch:
     """Points somewhere on a surface: each pulls at the nearest point of it, along the line between them."""
 
-    def __init__(self, points_mm: FloatArray, errors: PointErrors, triangles: IntArray) -> None:
-        self._points, self._errors, self._triangles = points_mm, errors, triangles
+    def __init__(self, points_mm: FloatArray, errors: PointErrors, tree: SurfaceTree) -> None:
+        self._points, self._errors, self._tree = points_mm, errors, tree
         self.groups = np.zeros((0, 1), dtype=np.int64)
 
     def rows(self, positions: FloatArray, first: int) -> Rows:
         """See `Match`."""
-        nearest = SurfaceTree(positions, self._triangles).nearest(self._points)
-        nodes = self._triangles[nearest.triangles]
+        nearest = self._tree.moved(positions).nearest(self._points)
+        nodes = self._tree.triangles[nearest.triangles]
         arms = self._points - nearest.closest_mm
         corners = positions[nodes]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
