@@ -55,9 +55,9 @@ def build_reduced(full: FullModel, displacements: FloatArray, reach: IntArray, s
     )
     some = states[np.random.default_rng(0).permutation(len(states))[:_STATES]]
     tangents = [few.stiffness(few.gradients(state[:count])) for state in some]
-    chosen = _cubature(few, some[:, :count], tangents, sizes.points, sizes.tolerance)
+    chosen = balancing_points(few, some[:, :count], tangents, sizes.points, sizes.tolerance)
     in_all = [with_tangent(stiffness, tangent) for tangent in tangents]
-    estimating = _cubature(every, some, in_all, sizes.estimate_points, sizes.tolerance)
+    estimating = balancing_points(every, some, in_all, sizes.estimate_points, sizes.tolerance)
     mesh, surface = full.model.mesh, full.surface
     skin = np.unique(surface.nodes)
     estimate = ErrorEstimate(
@@ -90,7 +90,7 @@ def _uncoupled(full: FullModel, basis: FloatArray, count: int) -> FloatArray:
     return np.concatenate([first, others], axis=2)
 
 
-def _cubature(
+def balancing_points(
     points: ElasticPoints, states: FloatArray, tangents: Sequence[FloatArray], most: int, tolerance: float
 ) -> Cubature:
     """Points that make the forces of all at the states (s, r), whose stiffness (r, r) is that of `tangents`.

@@ -5,6 +5,7 @@ import numpy as np
 from glisson.core.errors import BadInput
 from glisson.core.model import Model
 from glisson.core.observations import Observations
+from glisson.core.registered import Registered
 
 _METRES = 0.02
 _MUCH_LARGER = 3.0
@@ -37,4 +38,18 @@ def check_observations(model: Model, observations: Observations) -> None:
     if observations.frame == "patient" and apart > _FAR * organ:
         raise BadInput(
             f'The observations lie {apart:.0f} mm from the organ in the frame "patient"; name the frame they are in.'
+        )
+
+
+def check_last(model: Model, observations: Observations, last: Registered) -> None:
+    """Refuse a last answer that nothing can begin from.
+
+    Raises:
+        BadInput: it is of another model, or in another frame than the observations.
+    """
+    if not np.array_equal(last.deformation.mesh.nodes, model.mesh.nodes):
+        raise BadInput("The last answer is of another model; begin without it.")
+    if last.frame != observations.frame:
+        raise BadInput(
+            f"The last answer is in the frame {last.frame!r} and the observations in {observations.frame!r}."
         )

@@ -24,6 +24,7 @@ def outcome(
     spread_mm: FloatArray,
     beliefs: FloatArray,
     ambiguous: str | None,
+    forces_mn: FloatArray | None = None,
 ) -> Registered:
     """The answer of a fit that came to rest.
 
@@ -34,6 +35,7 @@ def outcome(
         spread_mm: (n, 3, k), see `Registered`.
         beliefs: (p,) how far each observed point is believed, 0 to 1.
         ambiguous: a sentence on another answer that is as good.
+        forces_mn: (n, 3), where they were looked for.
     """
     unobserved = unheld_motions(positions, spread_mm)
     status, message = Status.CONVERGED, Status.CONVERGED.sentence
@@ -48,6 +50,7 @@ def outcome(
         spread_mm=spread_mm,
         unobserved=unobserved,
         set_aside=float((beliefs < _SET_ASIDE).mean()),
+        forces_mn=forces_mn,
     )
 
 

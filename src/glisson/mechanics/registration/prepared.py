@@ -3,15 +3,12 @@
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-
 from glisson.core.arrays import FloatArray
-from glisson.core.errors import BadInput
 from glisson.core.model import Model
 from glisson.core.observations import Observations
 from glisson.core.protocols import Progress, silent
 from glisson.core.registered import Registered
-from glisson.mechanics.registration.checks import check_observations
+from glisson.mechanics.registration.checks import check_last, check_observations
 from glisson.mechanics.registration.contradictions import contradiction, misfits
 from glisson.mechanics.registration.fitting import fit
 from glisson.mechanics.registration.motion import BasisMotion
@@ -55,7 +52,8 @@ class Prepared:
             place = placed(self._places, observations)
             start, ambiguous = place.positions, place.ambiguous
         else:
-            start = self._checked(last, observations)
+            check_last(self._model, observations, last)
+            start = last.positions_mm
         progress(0.4, "deforming the organ")
         found, off = self._fitted(observations, start)
         doubt = contradiction(observations, off, self._fits) or ambiguous
@@ -70,15 +68,6 @@ class Prepared:
     def _fits(self, observations: Observations) -> bool:
         _, off = self._fitted(observations, placed(self._places, observations).positions)
         return not off
-
-    def _checked(self, last: Registered, observations: Observations) -> FloatArray:
-        if not np.array_equal(last.deformation.mesh.nodes, self._model.mesh.nodes):
-            raise BadInput("The last answer is of another model; begin without it.")
-        if last.frame != observations.frame:
-            raise BadInput(
-                f"The last answer is in the frame {last.frame!r} and the observations in {observations.frame!r}."
-            )
-        return last.positions_mm
 
 
 class MovedBody:

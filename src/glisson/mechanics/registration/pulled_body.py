@@ -52,10 +52,7 @@ class PulledBody:
     @cached_property
     def at_rest(self) -> Pulled:
         """Without forces."""
-        modal = np.zeros(self.basis.shape[2])
-        return Pulled(
-            np.zeros((self.shares.shape[1], 3)), modal, self.points.stiffness(self.points.gradients(modal))
-        )
+        return self.state(np.zeros((self.shares.shape[1], 3)), np.zeros(self.basis.shape[2]))
 
     @cached_property
     def _pulls(self) -> FloatArray:
@@ -93,4 +90,19 @@ class PulledBody:
         found = minimise(potential, begun, _TOLERANCE, _LIMIT)
         if not found.converged:
             raise StageFailed("The organ finds no equilibrium under the forces.", Status.STAGNATED)
-        return Pulled(amounts, found.unknowns, self.points.stiffness(self.points.gradients(found.unknowns)))
+        return self.state(amounts, found.unknowns)
+
+    def state(self, amounts: FloatArray, modal: FloatArray) -> Pulled:
+        """A state by its amounts (b, 3) and modal displacements (r,), which may be a little out of equilibrium."""
+        gradients = self.points.gradients(modal)
+        stiffness = self.points.stiffness(gradients)
+        try:
+            np.linalg.cholesky(stiffness)
+        except np.linalg.LinAlgError:  # it is about to buckle
+            stiffness = self.points.stiffness(gradients, project=True)
+        return Pulled(amounts, modal, stiffness)
+
+    def nearest(self, positions: FloatArray, forces: FloatArray) -> Pulled:
+        """The state next to node positions (n, 3) in mm and forces (n, 3) in mN."""
+        modal = np.tensordot(positions - self.rest, self.basis, 2)
+        return self.state(np.linalg.lstsq(self.shares, forces[self.patch], rcond=None)[0], modal)

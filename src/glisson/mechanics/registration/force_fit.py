@@ -1,0 +1,82 @@
+"""Gauss–Newton over the forces on a held body, with its compliance (Mestdagh and Cotin 2022)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from glisson.core.arrays import FloatArray
+from glisson.core.errors import StageFailed
+from glisson.core.status import Status
+from glisson.mechanics.registration.outliers import cuts, judged
+from glisson.mechanics.registration.pulled_body import Pulled, PulledBody
+from glisson.mechanics.registration.rows import Rows
+from glisson.mechanics.registration.seen import Seen
+
+_ITERATIONS = 60
+_STILL_MM = 0.05
+_LONGEST_MM = 15.0
+_HALVINGS = 6
+_LEAST = 1e-4  # variance of a way to move, as a share of the largest one's
+
+
+@dataclass(frozen=True, eq=False)
+class ForceFit:
+    """A state at rest, the Hessian (3 b, 3 b) of the cost there, and how far each observed point is believed (p,)."""
+
+    state: Pulled
+    hessian: FloatArray
+    beliefs: FloatArray
+
+
+def fit_forces(body: PulledBody, seen: Seen, start: Pulled) -> ForceFit:
+    """The forces of least cost, each amount of unit variance, near to a state.
+
+    What is not believed (Geman and McClure's function) is judged anew at every step.
+
+    Raises:
+        StageFailed: the organ does not come to rest.
+    """
+    state = start
+    for _ in range(_ITERATIONS):
+        rows = seen.rows(body.positions(state))
+        judgement = judged(rows, cuts(rows, seen.item))
+        follows = body.follows(state)
+        jacobian = _in_modes(body, rows) @ follows
+        weighted = jacobian * judgement.weights[:, None]
+        hessian = weighted.T @ jacobian + np.eye(body.count)
+        gradient = weighted.T @ rows.residuals - state.amounts.ravel()
+        step = cho_solve(cho_factor(hessian), gradient)
+        longest = float(np.linalg.norm(body.basis[body.patch] @ (follows @ step), axis=1).max())
+        if longest < _STILL_MM:
+            return ForceFit(state, hessian, judgement.beliefs)
+        state = _moved(body, state, min(1.0, _LONGEST_MM / longest) * step)
+    raise StageFailed("The organ does not come to rest on what was seen.", Status.ITERATION_LIMIT)
+
+
+def force_spread(body: PulledBody, found: ForceFit) -> FloatArray:
+    """The ways to move (n, 3, k) that are not certain, each by one standard deviation."""
+    follows = body.follows(found.state)
+    covariance = follows @ cho_solve(cho_factor(found.hessian), follows.T)
+    values, vectors = np.linalg.eigh(covariance)
+    kept = values > _LEAST * values[-1]
+    spread: FloatArray = body.basis @ (vectors[:, kept] * np.sqrt(values[kept]))
+    return spread
+
+
+def _in_modes(body: PulledBody, rows: Rows) -> FloatArray:
+    """Derivative (rows, r) of the whitened points, along the rows' directions, by the modal displacements."""
+    pulled = rows.weights[:, :, None] * (rows.directions / rows.sigma_mm[:, None])[:, None]
+    size = body.basis.shape[2]
+    fields = body.basis[rows.nodes].reshape(len(rows.nodes), -1, size)
+    result: FloatArray = np.matmul(pulled.reshape(len(fields), 1, -1), fields)[:, 0]
+    return result
+
+
+def _moved(body: PulledBody, state: Pulled, step: FloatArray) -> Pulled:
+    for _ in range(_HALVINGS):
+        try:
+            return body.moved(state, step)
+        except StageFailed as failure:
+            last, step = failure, 0.5 * step
+    raise last
