@@ -72,28 +72,30 @@ def _build(
     return node_lower[:used], node_upper[:used], left[:used], first[:used], size[:used], order
 
 
-def refitted(tree: BoxTree, lower: FloatArray, upper: FloatArray) -> BoxTree:
-    """The tree with its boxes around bodies that have moved: now `lower` and `upper`, each (n, 3) in mm."""
-    boxes = _refitted(tree.left, tree.first, tree.size, tree.order, lower, upper)
-    return tree._replace(lower=boxes[0], upper=boxes[1])
+def refitted(tree: BoxTree, corners: FloatArray) -> BoxTree:
+    """The tree with its boxes around bodies that have moved: their corners (n, c, 3) are now there, in mm."""
+    lower, upper = _refitted(tree.left, tree.first, tree.size, tree.order, corners)
+    return tree._replace(lower=lower, upper=upper)
 
 
 @compiled
 def _refitted(
-    left: IntArray, first: IntArray, size: IntArray, order: IntArray, lower: FloatArray, upper: FloatArray
+    left: IntArray, first: IntArray, size: IntArray, order: IntArray, corners: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    node_lower, node_upper = np.full((len(left), 3), np.inf), np.full((len(left), 3), -np.inf)
+    lower, upper = np.full((len(left), 3), np.inf), np.full((len(left), 3), -np.inf)
     for node in range(len(left) - 1, -1, -1):  # children come after their parent
         for axis in range(3):
             if left[node] >= 0:
                 one, other = left[node], left[node] + 1
-                node_lower[node, axis] = min(node_lower[one, axis], node_lower[other, axis])
-                node_upper[node, axis] = max(node_upper[one, axis], node_upper[other, axis])
+                lower[node, axis] = min(lower[one, axis], lower[other, axis])
+                upper[node, axis] = max(upper[one, axis], upper[other, axis])
                 continue
             for slot in range(first[node], first[node] + size[node]):
-                node_lower[node, axis] = min(node_lower[node, axis], lower[order[slot], axis])
-                node_upper[node, axis] = max(node_upper[node, axis], upper[order[slot], axis])
-    return node_lower, node_upper
+                for corner in range(corners.shape[1]):
+                    place = corners[order[slot], corner, axis]
+                    lower[node, axis] = min(lower[node, axis], place)
+                    upper[node, axis] = max(upper[node, axis], place)
+    return lower, upper
 
 
 @compiled

@@ -43,7 +43,7 @@ class SurfaceTree:
         """The same triangles with their vertices (n, 3) elsewhere, much quicker than a new tree and as exact."""
         other = copy(self)
         other._corners = np.ascontiguousarray(vertices[self.triangles])
-        other._tree = refitted(self._tree, other._corners.min(axis=1), other._corners.max(axis=1))
+        other._tree = refitted(self._tree, other._corners)
         return other
 
     def nearest(self, points_mm: ArrayLike) -> NearestTriangles:

@@ -14,10 +14,10 @@ from glisson.mechanics.registration.rows import Rows
 from glisson.mechanics.registration.seen import Seen
 
 _ITERATIONS = 60
-_STILL_MM = 0.05
+_STILL_MM = 0.1
 _LONGEST_MM = 15.0
 _HALVINGS = 6
-_LEAST = 1e-4  # variance of a way to move, as a share of the largest one's
+_LEAST = 1e-3  # variance of a way to move, as a share of the largest one's
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +60,7 @@ def force_spread(body: PulledBody, found: ForceFit) -> FloatArray:
     covariance = follows @ cho_solve(cho_factor(found.hessian), follows.T)
     values, vectors = np.linalg.eigh(covariance)
     kept = values > _LEAST * values[-1]
-    spread: FloatArray = body.basis @ (vectors[:, kept] * np.sqrt(values[kept]))
-    return spread
+    return body.fields(vectors[:, kept] * np.sqrt(values[kept]))
 
 
 def _in_modes(body: PulledBody, rows: Rows) -> FloatArray:

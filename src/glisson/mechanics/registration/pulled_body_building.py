@@ -13,8 +13,10 @@ from glisson.mechanics.reduced.points import elastic_points, some_points
 from glisson.mechanics.reduced.training import from_rest
 from glisson.mechanics.registration.pulled_body import PulledBody
 
-_MODES, _POINTS, _TOLERANCE = 60, 400, 3e-4
+_MODES, _POINTS, _TOLERANCE = 80, 500, 3e-4
 _SEED = 7
+_SIZES = (0.4, 1.6)  # of displacements that are learned from, in what is expected
+_WIDTHS = (0.15, 0.8)  # of graspers, in the size of the patch
 
 
 def pulled_body(
@@ -34,17 +36,30 @@ def pulled_body(
         StageFailed: the body has no equilibrium under any of them.
     """
     responses = _responses(full, patch, shares)
-    scale = reach_mm / float(np.sqrt((responses[:, patch] ** 2).sum(axis=(0, 2)).mean()))
-    shares = scale * shares
+    on_patch = responses[:, patch].reshape(shares.shape[1], 3, len(patch), 3)
+    scale = reach_mm / float(np.sqrt((on_patch**2).sum(axis=(0, 1, 3)).mean()))
     random = np.random.default_rng(_SEED)
-    drawn = [Load(nodes=patch, forces=shares @ random.normal(size=(shares.shape[1], 3))) for _ in range(loads)]
+    drawn = []
+    for _ in range(loads):
+        pull = _grasp(full.rest[patch], shares, random)
+        moved = np.einsum("bi,bikj->kj", pull, on_patch)
+        size = random.uniform(*_SIZES) * reach_mm / float(np.linalg.norm(moved, axis=1).max())
+        drawn.append(Load(nodes=patch, forces=size * shares @ pull))
     displacements = from_rest(full, drawn, progress)
     basis = modes(displacements, _MODES)
     every = elastic_points(full.model.mesh, full.model.materials, basis)
     states = np.tensordot(displacements, basis, 2)
     tangents = [every.stiffness(every.gradients(state)) for state in states]
     chosen = balancing_points(every, states, tangents, _POINTS, _TOLERANCE)
-    return PulledBody(full.rest, basis, some_points(every, chosen.points, chosen.factors), patch, shares)
+    return PulledBody(full.rest, basis, some_points(every, chosen.points, chosen.factors), patch, scale * shares)
+
+
+def _grasp(places: FloatArray, shares: FloatArray, random: np.random.Generator) -> FloatArray:
+    """Amounts (b, 3) of a grasper that pulls one way, somewhere on the patch (k, 3), over a random width."""
+    apart = np.linalg.norm(places - places[random.integers(len(places))], axis=1)
+    width = random.uniform(*_WIDTHS) * float(apart.max())
+    pressed = np.exp(-0.5 * (apart / width) ** 2)
+    return np.outer(np.linalg.lstsq(shares, pressed, rcond=None)[0], random.normal(size=3))
 
 
 def _responses(full: FullModel, patch: IntArray, shares: FloatArray) -> FloatArray:

@@ -35,5 +35,5 @@ def _areas(mesh: TetMesh) -> FloatArray:
     corners = mesh.nodes[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     thirds = np.repeat(np.linalg.norm(normals, axis=1) / 6.0, 3)
-    areas: FloatArray = np.bincount(triangles.ravel(), thirds, minlength=len(mesh.nodes))
+    areas: FloatArray = np.bincount(triangles.ravel(), thirds, minlength=len(mesh.nodes)).astype(np.float64)
     return areas
