@@ -19,11 +19,14 @@ from glisson.studies.local_pool import LocalPool
 from glisson.studies.reduced.benchmark import ReducedBenchmark
 from glisson.studies.reduced.plans import plan_and_model
 from glisson.studies.reduced.report import text_of, values_of
+from glisson.studies.registration.sequences import measured, trials
+from glisson.studies.registration.sequences_text import sequence_lines
 from glisson.studies.registration.study import SparseDataTwin
 
 _OURS = "Glisson"
 _REDUCED, _REGISTRATION = "reduced", "registration"
 _SHARED_DATA = "GLISSON_SHARED_DATA"
+_PULLED_LIVER = Path("open") / "mestdagh-liver-sequences"
 _FRAMES = "frames"
 _VIDEO_HEADING = "  engine                       seconds  ratio frames/s     MB  px off"
 _MASK_HEADING = "  engine                       seconds  ratio  its     MB    Dice  difference"
@@ -42,6 +45,13 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--quick", action="store_true", help="one small problem instead of all; some minutes")
     parser.add_argument("--seed", metavar="N", help="seed of the cases (reduced, registration; default 0)")
+    parser.add_argument(
+        "--sequences",
+        metavar="DIR",
+        nargs="?",
+        const="",
+        help="registration: on the public sequences of a pulled liver instead (by default in the shared data)",
+    )
     parser.add_argument("--out", metavar="DIR", help="where results go (default: studies/benchmark-NAME)")
 
 
@@ -52,6 +62,10 @@ def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:
     seed = whole_number(arguments.seed, "--seed", 0) or 0
     if arguments.benchmark == _REDUCED:
         return _reduced(out, arguments.quick, seed, lines)
+    if arguments.sequences is not None:
+        if arguments.benchmark != _REGISTRATION or arguments.seed is not None:
+            raise BadInput("--sequences belongs to the benchmark registration, and draws nothing that needs a --seed.")
+        return _sequences(out, arguments.sequences, arguments.quick, lines)
     if arguments.benchmark == _REGISTRATION:
         return study_answer(SparseDataTwin.of(arguments.quick, seed), out, LocalPool(), lines, arguments.quick)
     benchmark = Benchmark(arguments.benchmark, out, arguments.quick, lines)
@@ -66,6 +80,14 @@ def _reduced(out: Path, quick: bool, seed: int, lines: StageLines) -> Answer:
     values = values_of(ReducedBenchmark(model, plan, out, seed, lines).run())
     write_json(out / RESULTS, values)
     return Answer(values, text_of(values) + f"\nresults   {out / RESULTS}")
+
+
+def _sequences(out: Path, folder: str, quick: bool, lines: StageLines) -> Answer:
+    place = Path(folder) if folder else Path(os.environ.get(_SHARED_DATA, "../shared/data")) / _PULLED_LIVER
+    rows = [measured(trial, place, lines) for trial in trials(quick)]
+    out.mkdir(parents=True, exist_ok=True)
+    write_json(out / RESULTS, {"rows": rows})
+    return Answer({"rows": rows}, "\n".join([*sequence_lines(rows), f"results   {out / RESULTS}"]))
 
 
 def _tables(rows: Sequence[Row]) -> Iterator[str]:

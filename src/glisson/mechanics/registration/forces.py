@@ -31,12 +31,12 @@ class ForcesParameters:
 
     held: str = parameter("back", "node set that is held fast")
     pulled: str = parameter("", "node set that forces may act on; by default all of the surface that is not held")
-    reach_mm: float = parameter(40.0, "how far forces typically move the place they act on, mm", minimum=1e-3)
-    patch_mm: float = parameter(8.0, "over which length forces act alike, mm", minimum=1e-3)
+    reach_mm: float = parameter(50.0, "how far forces typically move the place they act on, mm", minimum=1e-3)
+    patch_mm: float = parameter(24.0, "over which length forces act alike, mm", minimum=1e-3)
     fields: int = parameter(20, "how many ways to spread forces over their place", minimum=1)
     loads: int = parameter(40, "random loads from which the reduced model is made", minimum=1)
     model_error_mm: float = parameter(0.3, ERROR_HELP, minimum=1e-3)
-    model_error_length_mm: float = parameter(10.0, LENGTH_HELP, minimum=1e-3)
+    model_error_length_mm: float = parameter(20.0, LENGTH_HELP, minimum=1e-3)
 
 
 class Forces:
