@@ -52,3 +52,12 @@ def test_triangles_without_area_are_segments_or_points(order):
     low, high = corners[list(order), 0].min(), corners[list(order), 0].max()
     expected = np.stack([np.clip(points[:, 0], low, high), np.zeros(50), np.zeros(50)], axis=1)
     np.testing.assert_allclose(tree.nearest(points).closest_mm, expected, atol=1e-9)
+
+
+def test_a_tree_that_was_moved_is_as_exact_as_a_new_one():
+    surface = sphere([0.0, 0.0, 0.0], 10.0, level=3)
+    moved = surface.vertices * [1.0, 2.0, 0.5] + np.sin(surface.vertices[:, ::-1])
+    points = np.random.default_rng(8).uniform(-25.0, 25.0, (500, 3))
+    found = SurfaceTree(surface.vertices, surface.triangles).moved(moved).nearest(points)
+    other = trimesh.Trimesh(moved, surface.triangles, process=False)
+    np.testing.assert_allclose(found.distance_mm, trimesh.proximity.closest_point_naive(other, points)[1], atol=1e-9)

@@ -46,7 +46,8 @@ def pulled_body(
         size = random.uniform(*_SIZES) * reach_mm / float(np.linalg.norm(moved, axis=1).max())
         drawn.append(Load(nodes=patch, forces=size * shares @ pull))
     displacements = from_rest(full, drawn, progress)
-    basis = modes(displacements, _MODES)
+    # What is small and turns little is linear, and costs nothing more to have exactly.
+    basis = modes(np.concatenate([displacements, scale * responses]), _MODES)
     every = elastic_points(full.model.mesh, full.model.materials, basis)
     states = np.tensordot(displacements, basis, 2)
     tangents = [every.stiffness(every.gradients(state)) for state in states]
