@@ -16,7 +16,7 @@ from glisson.mechanics.registration.seen import Seen
 _ITERATIONS = 60
 _STILL_MM = 0.1
 _LONGEST_MM = 15.0
-_HALVINGS = 6
+_HALVINGS = 5
 _LEAST = 1e-3  # variance of a way to move, as a share of the largest one's
 
 
@@ -29,6 +29,15 @@ class ForceFit:
     beliefs: FloatArray
 
 
+@dataclass(frozen=True, eq=False)
+class _Place:
+    state: Pulled
+    rows: Rows
+
+    def cost(self, cut: FloatArray) -> float:
+        return judged(self.rows, cut).cost + 0.5 * float((self.state.amounts**2).sum())
+
+
 def fit_forces(body: PulledBody, seen: Seen, start: Pulled) -> ForceFit:
     """The forces of least cost, each amount of unit variance, near to a state.
 
@@ -37,20 +46,21 @@ def fit_forces(body: PulledBody, seen: Seen, start: Pulled) -> ForceFit:
     Raises:
         StageFailed: the organ does not come to rest.
     """
-    state = start
+    here = _seen(body, seen, start)
     for _ in range(_ITERATIONS):
-        rows = seen.rows(body.positions(state))
-        judgement = judged(rows, cuts(rows, seen.item))
-        follows = body.follows(state)
-        jacobian = _in_modes(body, rows) @ follows
+        cut = cuts(here.rows, seen.item)
+        judgement = judged(here.rows, cut)
+        follows = body.follows(here.state)
+        jacobian = _in_modes(body, here.rows) @ follows
         weighted = jacobian * judgement.weights[:, None]
         hessian = weighted.T @ jacobian + np.eye(body.count)
-        gradient = weighted.T @ rows.residuals - state.amounts.ravel()
+        gradient = weighted.T @ here.rows.residuals - here.state.amounts.ravel()
         step = cho_solve(cho_factor(hessian), gradient)
         longest = float(np.linalg.norm(body.basis[body.patch] @ (follows @ step), axis=1).max())
-        if longest < _STILL_MM:
-            return ForceFit(state, hessian, judgement.beliefs)
-        state = _moved(body, state, min(1.0, _LONGEST_MM / longest) * step)
+        there = _lower(body, seen, here, min(1.0, _LONGEST_MM / longest) * step, cut) if longest > _STILL_MM else None
+        if there is None:
+            return ForceFit(here.state, hessian, judgement.beliefs)
+        here = there
     raise StageFailed("The organ does not come to rest on what was seen.", Status.ITERATION_LIMIT)
 
 
@@ -72,10 +82,19 @@ def _in_modes(body: PulledBody, rows: Rows) -> FloatArray:
     return result
 
 
-def _moved(body: PulledBody, state: Pulled, step: FloatArray) -> Pulled:
+def _seen(body: PulledBody, seen: Seen, state: Pulled) -> _Place:
+    return _Place(state, seen.rows(body.positions(state)))
+
+
+def _lower(body: PulledBody, seen: Seen, here: _Place, step: FloatArray, cut: FloatArray) -> _Place | None:
+    """Where a step, or a part of it, leads to less cost; None where none of them does."""
+    cost = here.cost(cut)
     for _ in range(_HALVINGS):
         try:
-            return body.moved(state, step)
-        except StageFailed as failure:
-            last, step = failure, 0.5 * step
-    raise last
+            there = _seen(body, seen, body.moved(here.state, step))
+            if there.cost(cut) < cost:
+                return there
+        except StageFailed:
+            pass
+        step = 0.5 * step
+    return None

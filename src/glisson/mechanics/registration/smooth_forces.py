@@ -4,6 +4,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from glisson.core.arrays import FloatArray, IntArray
+from glisson.core.errors import BadInput
 from glisson.core.mesh import TetMesh
 from glisson.geometry.quadratic import straight_boundary
 
@@ -16,10 +17,13 @@ def smooth_forces(mesh: TetMesh, nodes: IntArray, length_mm: float, most: int) -
     Amounts of unit variance along each axis make a random traction whose covariance falls with the distance as a
     Gaussian of standard deviation `length_mm` (Karhunen–Loève); forces are traction times area. The first field has
     the variance 1 in all.
+
+    Raises:
+        BadInput: there is no triangle between the nodes.
     """
     places = mesh.nodes[nodes]
     apart = ((places[:, None] - places[None]) ** 2).sum(axis=2)
-    areas = _areas(mesh)[nodes]
+    areas = _areas(mesh, nodes)
     covariance = areas[:, None] * np.exp(-0.5 * apart / length_mm**2) * areas
     first = max(len(nodes) - most, 0)
     values, vectors = eigh(covariance, subset_by_index=[first, len(nodes) - 1])
@@ -29,11 +33,14 @@ def smooth_forces(mesh: TetMesh, nodes: IntArray, length_mm: float, most: int) -
     return shares
 
 
-def _areas(mesh: TetMesh) -> FloatArray:
-    """A third of the area of its triangles for every node (n,), in mm²."""
+def _areas(mesh: TetMesh, nodes: IntArray) -> FloatArray:
+    """A third of the area of the patch's triangles for every node (k,), in mm²."""
     triangles, _ = straight_boundary(mesh)
+    triangles = triangles[np.isin(triangles, nodes).all(axis=1)]
+    if len(triangles) == 0:
+        raise BadInput("The nodes that forces may act on have no triangle of the surface between them.")
     corners = mesh.nodes[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     thirds = np.repeat(np.linalg.norm(normals, axis=1) / 6.0, 3)
     areas: FloatArray = np.bincount(triangles.ravel(), thirds, minlength=len(mesh.nodes)).astype(np.float64)
-    return areas
+    return areas[nodes]
