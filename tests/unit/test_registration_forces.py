@@ -66,7 +66,7 @@ def model() -> Model:
 @pytest.fixture(scope="module")
 def prepared(model: Model) -> PreparedForces:
     exact = {"model_error_mm": 0.02, "model_error_length_mm": 1.0}
-    return Forces(ForcesParameters("held", "far", reach_mm=20.0, patch_mm=200.0, loads=16, **exact)).prepare(model)
+    return Forces(ForcesParameters("held", "far", reach_mm=20.0, patch_mm=200.0, loads=40, **exact)).prepare(model)
 
 
 @pytest.fixture(scope="module")

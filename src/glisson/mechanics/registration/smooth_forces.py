@@ -2,35 +2,43 @@
 
 import numpy as np
 from scipy.linalg import eigh
+from scipy.spatial.distance import cdist
 
 from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.errors import BadInput
 from glisson.core.mesh import TetMesh
 from glisson.geometry.quadratic import straight_boundary
+from glisson.geometry.spreading import evenly_spread
 
 _LEAST = 1e-3  # variance of a field, as a share of the first one's
+_CENTRES = 500
 
 
 def smooth_forces(mesh: TetMesh, nodes: IntArray, length_mm: float, most: int) -> FloatArray:
     """Shares (k, b) of the forces on the `nodes` (k,) in up to `most` fields, the strongest first.
 
     Amounts of unit variance along each axis make a random traction whose covariance falls with the distance as a
-    Gaussian of standard deviation `length_mm` (Karhunen–Loève); forces are traction times area. The first field has
-    the variance 1 in all.
+    Gaussian of standard deviation `length_mm` (Karhunen–Loève, by Nyström on a large patch); forces are traction times
+    area. The first field has the variance 1 in all.
 
     Raises:
         BadInput: there is no triangle between the nodes.
     """
     places = mesh.nodes[nodes]
-    apart = ((places[:, None] - places[None]) ** 2).sum(axis=2)
-    areas = _areas(mesh, nodes)
-    covariance = areas[:, None] * np.exp(-0.5 * apart / length_mm**2) * areas
-    first = max(len(nodes) - most, 0)
-    values, vectors = eigh(covariance, subset_by_index=[first, len(nodes) - 1])
-    values, vectors = values[::-1], vectors[:, ::-1]
+    centres = places[evenly_spread(places, _CENTRES)]
+    values, vectors = eigh(_alike(centres, centres, length_mm))
+    values, vectors = values[::-1][:most], vectors[:, ::-1][:, :most]
     kept = values > _LEAST * values[0]
-    shares: FloatArray = vectors[:, kept] * np.sqrt(values[kept] / values[0])
-    return shares
+    tractions = _alike(places, centres, length_mm) @ (vectors[:, kept] / np.sqrt(values[kept]))
+    shares = _areas(mesh, nodes)[:, None] * tractions
+    scaled: FloatArray = shares / np.linalg.norm(shares[:, 0])
+    return scaled
+
+
+def _alike(places: FloatArray, others: FloatArray, length_mm: float) -> FloatArray:
+    """Covariance (n, m) of tractions at places (n, 3) and others (m, 3)."""
+    covariance: FloatArray = np.exp(-0.5 * cdist(places, others, "sqeuclidean") / length_mm**2)
+    return covariance
 
 
 def _areas(mesh: TetMesh, nodes: IntArray) -> FloatArray:
