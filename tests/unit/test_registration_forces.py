@@ -167,8 +167,24 @@ def test_what_cannot_be_is_refused(model: Model, prepared: PreparedForces) -> No
         Forces(ForcesParameters(held="held", pulled="held")).prepare(model)
     with pytest.raises(BadInput, match='frame "patient"'):
         prepared.register(Observations((replace(seen.items[0], frame="room"),)))
-    with pytest.raises(BadInput, match="tells no forces"):
-        prepared.register(seen, replace(prepared.register(seen), forces_mn=None))
+    with pytest.raises(BadInput, match="no triangle"):
+        Forces(ForcesParameters(held="upper", pulled="held")).prepare(
+            replace(model, node_sets={**model.node_sets, "held": model.node_set("held")[:1]})
+        )
+
+
+def test_another_organ_is_told(model: Model, prepared: PreparedForces) -> None:
+    wide = model.mesh.nodes * [1.0, 1.0, 1.5]
+    found = prepared.register(cloud(model.mesh, wide, model.node_set("upper"), 9))
+    assert found.status == Status.AMBIGUOUS
+    assert "Is it of this organ?" in found.deformation.message
+
+
+def test_an_answer_without_forces_is_no_beginning_but_no_hindrance(model: Model, prepared: PreparedForces) -> None:
+    seen = cloud(model.mesh, model.mesh.nodes, model.node_set("upper"), 6)
+    found = prepared.register(seen)
+    again = prepared.register(seen, replace(found, forces_mn=None))
+    np.testing.assert_allclose(again.positions_mm, found.positions_mm, atol=1e-6)
 
 
 def test_nothing_pulled_is_found_at_rest(model: Model, prepared: PreparedForces) -> None:

@@ -43,8 +43,12 @@ def _explained() -> dict[str, str]:
         if listing.is_available:
             for field in fields(technique_class("registration", listing.name).Parameters):
                 words = str(field.metadata["help"]).rstrip(".")
-                explained.setdefault(field.name, (words, []))[1].append(f"{listing.name}, default {field.default:g}")
+                explained.setdefault(field.name, (words, []))[1].append(f"{listing.name}, {_default(field.default)}")
     return {name: f"{words} ({'; '.join(techniques)})" for name, (words, techniques) in explained.items()}
+
+
+def _default(value: object) -> str:
+    return f"default {value:g}" if isinstance(value, (int, float)) else f"default {value}" if value else "no default"
 
 
 def _run(arguments: argparse.Namespace, lines: StageLines) -> Answer:

@@ -22,9 +22,10 @@ _LEAST = 1e-3  # variance of a way to move, as a share of the largest one's
 
 @dataclass(frozen=True, eq=False)
 class ForceFit:
-    """A state at rest, the Hessian (3 b, 3 b) of the cost there, and how far each observed point is believed (p,)."""
+    """A state at rest, what was seen there, the Hessian (3 b, 3 b) of the cost, and beliefs (p,) in the points."""
 
     state: Pulled
+    rows: Rows
     hessian: FloatArray
     beliefs: FloatArray
 
@@ -59,7 +60,7 @@ def fit_forces(body: PulledBody, seen: Seen, start: Pulled) -> ForceFit:
         longest = float(np.linalg.norm(body.basis[body.patch] @ (follows @ step), axis=1).max())
         there = _lower(body, seen, here, min(1.0, _LONGEST_MM / longest) * step, cut) if longest > _STILL_MM else None
         if there is None:
-            return ForceFit(here.state, hessian, judgement.beliefs)
+            return ForceFit(here.state, here.rows, hessian, judgement.beliefs)
         here = there
     raise StageFailed("The organ does not come to rest on what was seen.", Status.ITERATION_LIMIT)
 

@@ -15,11 +15,12 @@ from glisson.core.registered import Registered
 from glisson.core.scenario import Scenario
 from glisson.mechanics.reduced.full import FullModel
 from glisson.mechanics.registration.checks import check_last, check_observations
+from glisson.mechanics.registration.contradictions import contradiction, misfits
 from glisson.mechanics.registration.elastic_parameters import ERROR_HELP, LENGTH_HELP
-from glisson.mechanics.registration.force_fit import fit_forces, force_spread
+from glisson.mechanics.registration.force_fit import ForceFit, fit_forces, force_spread
 from glisson.mechanics.registration.outcome import outcome
 from glisson.mechanics.registration.places import Places
-from glisson.mechanics.registration.pulled_body import PulledBody
+from glisson.mechanics.registration.pulled_body import Pulled, PulledBody
 from glisson.mechanics.registration.pulled_body_building import pulled_body
 from glisson.mechanics.registration.seen import ModelError, Seen
 from glisson.mechanics.registration.smooth_forces import smooth_forces
@@ -93,11 +94,15 @@ class PreparedForces:
         body, start = self._body, self._body.at_rest
         if last is not None:
             check_last(self._model, observations, last)
-            if last.forces_mn is None:
-                raise BadInput("The last answer tells no forces; begin without it.")
-            start = body.nearest(last.positions_mm, last.forces_mn)
-        found = fit_forces(body, Seen(self._places, observations, self._error), start)
-        spread, forces = force_spread(body, found), body.forces(found.state)
-        return outcome(
-            self._model, observations.frame, body.positions(found.state), spread, found.beliefs, None, forces
-        )
+            if last.forces_mn is not None:
+                start = body.nearest(last.positions_mm, last.forces_mn)
+        found, off = self._fitted(observations, start)
+        doubt = contradiction(observations, off, lambda some: not self._fitted(some, body.at_rest)[1])
+        positions, spread, forces = body.positions(found.state), force_spread(body, found), body.forces(found.state)
+        return outcome(self._model, observations.frame, positions, spread, found.beliefs, doubt, forces)
+
+    def _fitted(self, observations: Observations, start: Pulled) -> tuple[ForceFit, tuple[str, ...]]:
+        """The forces fitted, and what does not fit."""
+        seen = Seen(self._places, observations, self._error)
+        found = fit_forces(self._body, seen, start)
+        return found, misfits(seen, found.rows)
