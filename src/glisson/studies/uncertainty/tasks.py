@@ -77,8 +77,8 @@ def _judged(found: Registered, case: SparseCase, locator: PointLocator) -> dict[
 def expected_length(covariance: FloatArray) -> FloatArray:
     """Mean length (t,) of normal vectors of zero mean and covariance (t, 3, 3), in their unit.
 
-    By the mean and the variance of the squared length to second order: within 1 % where all axes are alike, 6 % too
-    small where only one counts.
+    By the mean and the variance of the squared length to second order: within 1 % where all axes are alike, up
+    to 7 % too small where only one counts.
     """
     trace = np.trace(covariance, axis1=1, axis2=2)
     lengths: FloatArray = np.sqrt(trace) * (1.0 - (covariance**2).sum(axis=(1, 2)) / (4.0 * trace**2))
