@@ -75,8 +75,8 @@ def _text(made: RegisteredCase) -> str:
     told.append(f"elsewhere   known to {values['sigma_mm']:.1f} mm (one standard deviation, median of the nodes)")
     if (touch := values["next_touch"]) is not None:
         told.append(
-            f"touch next  the surface at {place_text(values['next_touch_mm'])}: {touch['tumour']} is then expected to be "
-            f"off by {touch['rms_after_mm']:.1f} mm (root mean square) instead of {touch['rms_before_mm']:.1f} mm"
+            f"touch next  the surface at {place_text(values['next_touch_mm'])}: {touch['tumour']} is then expected to "
+            f"be off by {touch['rms_after_mm']:.1f} mm (root mean square) instead of {touch['rms_before_mm']:.1f} mm"
         )
     if made.found.set_aside > 0.0:
         told.append(f"set aside   {100.0 * made.found.set_aside:.0f} % of the observed points as outliers")

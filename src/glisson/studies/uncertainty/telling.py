@@ -34,7 +34,7 @@ def as_lines(values: Mapping[str, Any]) -> list[str]:
         lines.append(
             f"touch     {told['cases']} cases: the tumour is off by {told['before_mm']:.2f} mm, after the proposed "
             f"touch by {told['proposed_mm']:.2f} mm, after any other by {told['random_mm']:.2f} mm: "
-            f"{told['gain_percent']:.1f} % lower, p = {'–' if told['p'] is None else format(told['p'], '.2g')}"
+            f"a gain of {told['gain_percent']:.1f} %, p = {'–' if told['p'] is None else format(told['p'], '.2g')}"
         )
     lines += [f"failed    {message}" for message in values["failed"]]
     if values["unfinished"]:
