@@ -11,6 +11,7 @@ import numpy as np
 from scipy.stats import chi2, wilcoxon
 
 from glisson.core.arrays import FloatArray
+from glisson.phantom.sparse_data.design import NOISES_MM
 from glisson.studies.uncertainty.design import COVERAGES
 from glisson.studies.uncertainty.tasks import PROPOSED, RANDOM
 
@@ -82,7 +83,7 @@ def parts(rows: Sequence[Row]) -> dict[str, list[Row]]:
     """Rows by kind of truth, by share of the surface that is seen, by noise, and those with outliers."""
     found = {origin: [row for row in rows if row["origin"] == origin] for origin in ("packed", "closed-form")}
     found |= {name: [row for row in rows if row["bin"] == number] for number, name in enumerate(BIN_NAMES)}
-    found |= {f"noise {noise:g} mm": [row for row in rows if row["noise_mm"] == noise] for noise in (0.0, 2.0)}
+    found |= {f"noise {noise:g} mm": [row for row in rows if row["noise_mm"] == noise] for noise in NOISES_MM}
     return found | {"outliers": [row for row in rows if row["outlier_share"] > 0.0]}
 
 
