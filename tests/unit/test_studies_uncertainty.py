@@ -81,6 +81,9 @@ def test_each_liver_has_cases_of_its_own() -> None:
     cases = [case for member in design.reported[:10] for case in design.cases(member)]
     assert {case.bin for case in cases} == set(range(len(COVERAGES)))
     assert all(COVERAGES[case.bin][0] <= case.coverage <= COVERAGES[case.bin][1] for case in cases)
+    touched = [len(set(design.touched(member))) for member in design.reported]
+    assert min(touched) == 5
+    assert design.touched(design.tuning[0]) == ()
     bent = [(case.member, case.deformation) for case in cases if case.origin == "closed-form"]
     assert len(set(bent)) == len(bent) == 70
 
@@ -98,7 +101,7 @@ def test_one_liver_from_end_to_end(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
     assert 0.5 < said["predicted_mm"] < 15.0
     assert 0.5 < said["actual_mm"] < 15.0
     assert said["correlation"] is None
-    assert said["touch"]["cases"] == 2
+    assert said["touch"]["cases"] + said["touch_denser"]["cases"] == 2
     assert {"before_mm", "proposed_mm", "random_mm", "gain_percent", "p"} <= set(said["touch"])
     assert said["parts"]["packed"]["cases"] == said["parts"]["closed-form"]["cases"] == 1
     assert said["inflation"] > 0.0

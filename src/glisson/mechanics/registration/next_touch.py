@@ -16,8 +16,8 @@ from glisson.core.registered import Registered
 from glisson.geometry.distance import SurfaceTree
 from glisson.geometry.quadratic import straight_boundary
 
-TOUCH_MM = 0.5
-"""Standard deviation of a touch: a tracked tip's."""
+TOUCH_MM = 1.0
+"""Standard deviation of a touch: a tracked tip's, and how far the surface is off beside what it is taken for."""
 
 _FACING = 0.1
 """A point can be seen and reached where its normal is towards the viewer by a cosine of so much."""

@@ -16,6 +16,9 @@ from glisson.phantom.sparse_data.design import (
 COVERAGES = ((0.06, 0.12), (0.12, 0.20), (0.20, 0.28), (0.28, 0.36), (0.36, 0.44))
 """Shares of the surface that are seen: the sparse-data study's, and less, where an error bar matters most."""
 
+SPARSE = 2
+"""In the first so many ranges little is seen: that is when one asks where to touch next."""
+
 PACKED_VIEWS, BENDS = 3, 7
 """Cases of each liver: views of the liver packed in one way, and bends, each seen once."""
 
@@ -52,6 +55,13 @@ class UncertaintyDesign:
                 kinds.append(("packed", 0))
             kinds.append(("closed-form", turn))
         return tuple(self._case(member, number, *kind) for number, kind in enumerate(kinds[: self.cases_each]))
+
+    def touched(self, member: int) -> tuple[int, ...]:
+        """Numbers of a liver's cases that are touched once more: all of which little is seen, and one other."""
+        if member not in self.reported:
+            return ()
+        sparse, other = ([c.number for c in self.cases(member) if (c.bin < SPARSE) == few] for few in (True, False))
+        return (*sparse, *other[:1])
 
     def _case(self, member: int, number: int, origin: Origin, deformation: int) -> CaseDesign:
         random = np.random.default_rng([self.seed, member, number, _STREAM])

@@ -12,7 +12,7 @@ from glisson.studies.registration.solving_model import model_point
 from glisson.studies.registration.truths import truth_point
 from glisson.studies.study import Conclusion
 from glisson.studies.tables import as_csv
-from glisson.studies.uncertainty.design import UncertaintyDesign
+from glisson.studies.uncertainty.design import SPARSE, UncertaintyDesign
 from glisson.studies.uncertainty.scores import Row, inflation, parts, scores, touch
 from glisson.studies.uncertainty.tasks import LIVER
 from glisson.studies.uncertainty.telling import as_lines, as_page, draw_calibration
@@ -21,9 +21,6 @@ QUICK = {"livers": 2, "tuning_livers": 1, "cases_each": 4}
 
 TRUTH_EDGE_MM = 18.0
 """Some 6,000 quadratic elements: cheaper than the sparse-data study's, still finer than the models under test."""
-
-_TOUCHED = 3
-"""So many cases of each liver are touched once more: two packed, one bent."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +55,8 @@ class UncertaintyStudy:
         values: dict[str, Any] = {
             **scores(reported),
             "inflation": INFLATION,
-            "touch": touch(reported),
+            "touch": touch([row for row in reported if row["bin"] < SPARSE]),
+            "touch_denser": touch([row for row in reported if row["bin"] >= SPARSE]),
             "parts": {name: scores(some) for name, some in parts(reported).items()},
             "tuning": scores(tuning) | {"inflation": None if wanted is None else INFLATION * wanted},
             "failed": self._failed(prepared, rows, found),
@@ -80,7 +78,7 @@ class UncertaintyStudy:
             "cases": [asdict(case) for case in cases],
             "model": self._models[member].key,
             "truth": truth if is_packed else None,
-            "touched": _TOUCHED if member in self.design.reported else 0,
+            "touched": list(self.design.touched(member)),
         }
         return Point(LIVER, inputs, cost=float(len(cases)))
 

@@ -14,7 +14,7 @@ from glisson.core.registered import Registered
 from glisson.core.registry import make_technique
 from glisson.geometry.distance import SurfaceTree
 from glisson.geometry.location import PointLocator
-from glisson.mechanics.registration.next_touch import TOUCH_MM, Touches, touches, viewer
+from glisson.mechanics.registration.next_touch import Touches, touches, viewer
 from glisson.phantom.sparse_data.case import SparseCase
 from glisson.phantom.sparse_data.design import CaseDesign
 from glisson.phantom.sparse_data.liver import build_sparse_liver
@@ -27,19 +27,22 @@ TECHNIQUE = "linear-basis"
 LIVER = Task(f"{__name__}:score_liver", (*SCORE.packages, __name__))
 
 PROPOSED, RANDOM = "proposed", "random"
+STYLUS_MM = 0.5
+"""Standard deviation of a touch in each coordinate."""
+
 _STREAM = 7
 
 
 def score_liver(inputs: Mapping[str, Any], folder: Path) -> Outcome:
-    """`rows`, one for each case of a liver; the first of them are touched once more, too."""
+    """`rows`, one for each case of a liver; those whose numbers are in `touched` are touched once more, too."""
     model = read_model(folder, inputs["model"])
     prepared = make_technique("registration", TECHNIQUE, {}, TECHNIQUE).prepare(model)
     locator = PointLocator(model.mesh)
     rows = []
-    for number, values in enumerate(inputs["cases"]):
+    for values in inputs["cases"]:
         design = CaseDesign(**values)
         truth = inputs["truth"] if design.origin == "packed" else None
-        rows.append(_row(design, folder, truth, prepared, locator, number < inputs["touched"]))
+        rows.append(_row(design, folder, truth, prepared, locator, design.number in inputs["touched"]))
     return Outcome({"rows": rows})
 
 
@@ -101,8 +104,8 @@ def _touched(
     chosen = {PROPOSED: offered.best, RANDOM: _any(offered, random)}
     errors = {"before": float(np.linalg.norm(weights @ found.positions_mm[nodes] - case.true_targets_mm[tumour]))}
     for name, number in chosen.items():
-        place = truth.nearest(offered.points_mm[number]).closest_mm + random.normal(scale=TOUCH_MM, size=(1, 3))
-        touch = Observation("surface", "touch", place, TOUCH_MM, case.observations.frame)
+        place = truth.nearest(offered.points_mm[number]).closest_mm + random.normal(scale=STYLUS_MM, size=(1, 3))
+        touch = Observation("surface", "touch", place, STYLUS_MM, case.observations.frame)
         after = prepared.register(Observations((*case.observations.items, touch)), found)
         errors[name] = float(np.linalg.norm(weights @ after.positions_mm[nodes] - case.true_targets_mm[tumour]))
     return errors

@@ -29,13 +29,13 @@ def as_lines(values: Mapping[str, Any]) -> list[str]:
         f"inflation {values['inflation']:g}; {number(values['tuning']['inflation'])} would do on the "
         f"{values['tuning']['cases']} cases of {values['tuning']['livers']} tuning livers"
     )
-    told = values["touch"]
-    if told["proposed_mm"] is not None:
-        lines.append(
-            f"touch     {told['cases']} cases: the tumour is off by {told['before_mm']:.2f} mm, after the proposed "
-            f"touch by {told['proposed_mm']:.2f} mm, after any other by {told['random_mm']:.2f} mm: "
-            f"a gain of {told['gain_percent']:.1f} %, p = {'–' if told['p'] is None else format(told['p'], '.2g')}"
-        )
+    lines += [
+        f"touch     {told['cases']} cases of which {words} is seen: the tumour is off by {told['before_mm']:.2f} mm, "
+        f"after the proposed touch by {told['proposed_mm']:.2f} mm, after any other by {told['random_mm']:.2f} mm: a gain "
+        f"of {told['gain_percent']:.1f} %, p = {'–' if told['p'] is None else format(told['p'], '.2g')}"
+        for told, words in ((values["touch"], "little"), (values["touch_denser"], "more"))
+        if told["cases"]
+    ]
     lines += [f"failed    {message}" for message in values["failed"]]
     if values["unfinished"]:
         lines.append(f"note      {values['unfinished']} livers are not done yet; run again to go on")
