@@ -31,8 +31,8 @@ def as_lines(values: Mapping[str, Any]) -> list[str]:
     )
     lines += [
         f"touch     {told['cases']} cases of which {words} is seen: the tumour is off by {told['before_mm']:.2f} mm, "
-        f"after the proposed touch by {told['proposed_mm']:.2f} mm, after any other by {told['random_mm']:.2f} mm: a gain "
-        f"of {told['gain_percent']:.1f} %, p = {'–' if told['p'] is None else format(told['p'], '.2g')}"
+        f"after the proposed touch by {told['proposed_mm']:.2f} mm, after any other by {told['random_mm']:.2f} mm: "
+        f"a gain of {told['gain_percent']:.1f} %, p = {'–' if told['p'] is None else format(told['p'], '.2g')}"
         for told, words in ((values["touch"], "little"), (values["touch_denser"], "more"))
         if told["cases"]
     ]
