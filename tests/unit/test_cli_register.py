@@ -68,6 +68,26 @@ def test_what_cannot_be_registered_is_refused(case: Case, glisson: Glisson, tmp_
     assert not case.has("results/registered")
 
 
+def test_where_to_touch_next_is_on_the_side_that_was_seen(case: Case, glisson: Glisson) -> None:
+    model = read_model(case.path(MODEL))
+    swab, wire = seen(case).items
+    scan = (swab.points_mm - SHIFT) @ TURN
+    front = replace(swab, points_mm=swab.points_mm[scan[:, 1] < np.percentile(scan[:, 1], 25.0)])
+    write_observations(case.path(OBSERVATIONS), Observations((front, wire)))
+    code, said = glisson("register", case.folder)
+    assert code == 0, said
+    written = read_deformation(said["folder"])
+    nodes = written.mesh.moved(written.displacement)
+    triangles = written.mesh.boundary()[0]
+    assert np.linalg.norm(nodes[triangles].mean(axis=1) - said["next_touch_mm"], axis=1).min() < 1e-6
+    assert ((np.array(said["next_touch_mm"]) - SHIFT) @ TURN)[1] < model.mesh.nodes[:, 1].mean()
+    touch = said["next_touch"]
+    assert touch["tumour"] == model.structures.tumours[0].name
+    assert 0.0 < touch["rms_after_mm"] < touch["rms_before_mm"]
+    write_observations(case.path(OBSERVATIONS), Observations((wire,)))
+    assert glisson("register", case.folder, "--technique", "rigid")[1]["next_touch_mm"] is None
+
+
 def test_frames_follow_one_another(case: Case, glisson: Glisson, tmp_path: Path) -> None:
     files = []
     for number, shift in enumerate((0.0, 3.0)):

@@ -14,8 +14,8 @@ from glisson.framework.case import open_case
 from glisson.framework.registering import LINEAR_BASIS, RegisteredCase, register_case
 
 _KEYS = (
-    "status", "message", "technique", "frame", "unobserved", "set_aside", "sigma_mm", "tumours", "time_s", "moved_mm",
-    "jumped", "notes", "frames", "folder", "seconds",
+    "status", "message", "technique", "frame", "unobserved", "set_aside", "sigma_mm", "tumours",
+    "next_touch_mm", "next_touch", "time_s", "moved_mm", "jumped", "notes", "frames", "folder", "seconds",
 )  # fmt: skip
 
 
@@ -77,6 +77,11 @@ def _text(made: RegisteredCase) -> str:
             f"{tumour['radius95_mm']:.1f} mm by 95 %"
         )
     told.append(f"elsewhere   known to {values['sigma_mm']:.1f} mm (one standard deviation, median of the nodes)")
+    if (touch := values["next_touch"]) is not None:
+        told.append(
+            f"touch next  the surface at {place_text(values['next_touch_mm'])}: {touch['tumour']} is then expected to "
+            f"be off by {touch['rms_after_mm']:.1f} mm (root mean square) instead of {touch['rms_before_mm']:.1f} mm"
+        )
     if made.found.set_aside > 0.0:
         told.append(f"set aside   {100.0 * made.found.set_aside:.0f} % of the observed points as outliers")
     told += [f"look at     {note}" for note in made.found.notes]

@@ -22,6 +22,7 @@ from glisson.studies.sensitivity.study import Sensitivity
 from glisson.studies.study import Study, run_study
 from glisson.studies.surface.study import SurfaceStudy
 from glisson.studies.trocar.study import TrocarStudy
+from glisson.studies.uncertainty.study import UncertaintyStudy
 from glisson.studies.ventilation.study import VentilationStudy
 
 STUDIES = {
@@ -34,6 +35,7 @@ STUDIES = {
     "sparse-data": "how well registrations find livers of which only a part of the surface is seen",
     "trocar": "how wrong the pose of a trocar is that sees crosses, and whether a wrong one passes silently",
     "surface": "how wrong surface points from two laparoscope views are (the dissertation's Tables 3 and 4)",
+    "uncertainty": "whether error bars of registrations hold, and whether a touch where they say so tells more",
     "ventilation": "how well breathing is told and taken away, and where faster ventilation stops helping",
 }
 
@@ -41,7 +43,7 @@ STUDIES = {
 _OWN_OPTIONS = {
     "seed": (
         LiftRobustness.name, ContactStudy.name, SparseDataTwin.name, SurfaceStudy.name, TrocarStudy.name,
-        VentilationStudy.name,
+        UncertaintyStudy.name, VentilationStudy.name,
     ),
     "long": (Sensitivity.name,),
     "element": (Sensitivity.name,),
@@ -105,6 +107,8 @@ def _study(arguments: argparse.Namespace) -> Study:
         return SparseDataTwin.of(arguments.quick, seed)
     if arguments.study == SurfaceStudy.name:
         return SurfaceStudy.of(arguments.quick, seed)
+    if arguments.study == UncertaintyStudy.name:
+        return UncertaintyStudy.of(arguments.quick, seed)
     if arguments.study == VentilationStudy.name:
         return VentilationStudy.of(arguments.quick, seed)
     return Sensitivity.of(arguments.quick, arguments.long, arguments.element or "T10")
@@ -133,5 +137,5 @@ COMMAND = Command(
     "  glisson study sensitivity --scheduler tcp://127.0.0.1:8786 --json",
     _add_arguments,
     _run,
-    ("rows", "cases", "converged", "pairs", "breathing", "views", "silent_wrong", "flagged", "seconds"),
+    ("rows", "cases", "converged", "pairs", "breathing", "views", "silent_wrong", "flagged", "coverage90", "seconds"),
 )

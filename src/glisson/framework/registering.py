@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
+from glisson.core.arrays import FloatArray, IntArray
 from glisson.core.errors import BadInput
+from glisson.core.observations import Observations
 from glisson.core.protocols import Progress, silent
 from glisson.core.registered import Registered
 from glisson.core.registry import make_technique
@@ -23,6 +25,7 @@ from glisson.io.observation_files import read_observations
 from glisson.io.records import write_json
 from glisson.io.scenario_files import read_scenario
 from glisson.mechanics.registration.following import Followed, Following
+from glisson.mechanics.registration.next_touch import touches, viewer
 
 LINEAR_BASIS = "linear-basis"
 REGISTERED = f"{RESULTS}/registered"
@@ -79,7 +82,8 @@ def register_case(
         except BadInput as refused:
             raise BadInput(f"{file}: {refused}") from None
     told = [_values(frame, model.structures.tumours) for frame in frames]
-    values = told[-1] | {"technique": technique, "frames": told}
+    touch = _next_touch(frames[-1].found, seen[-1], model.structures.tumours)
+    values = told[-1] | touch | {"technique": technique, "frames": told}
     with exclusive(case.folder), atomic_folder(case.path(REGISTERED)) as folder:
         write_deformation(folder, frames[-1].found.deformation)
         write_json(folder / _ANSWER, values)
@@ -107,14 +111,33 @@ def _values(answer: Followed, tumours: Iterable[Tumour]) -> dict[str, Any]:
 
 def _now(tumour: Tumour, found: Registered) -> dict[str, Any]:
     """A tumour's centroid in the scan and in the observations' frame, and the radius that holds it by 95 %, mm."""
-    mesh, before = found.deformation.mesh, tumour.centroid_mm
-    locator = PointLocator(mesh)
-    location = locator.locate(before)
-    after = locator.interpolate(location, found.positions_mm)[0]
-    covariance = found.covariance(mesh.tetrahedra[location.elements], locator.weights(location))[0]
+    nodes, weights = _nodes_of(tumour, found)
+    covariance = found.covariance(nodes[None], weights[None])[0]
     return {
         "name": tumour.name,
-        "before_mm": before.tolist(),
-        "after_mm": after.tolist(),
+        "before_mm": tumour.centroid_mm.tolist(),
+        "after_mm": (weights @ found.positions_mm[nodes]).tolist(),
         "radius95_mm": float(np.sqrt(chi2.ppf(0.95, 3) * np.linalg.eigvalsh(covariance)[-1])),
     }
+
+
+def _next_touch(found: Registered, seen: Observations, tumours: Sequence[Tumour]) -> dict[str, Any]:
+    """Where to touch next for the first tumour, mm in the observations' frame, and what that is expected to change.
+
+    Null where there is no tumour, or nothing of the surface was seen.
+    """
+    towards = viewer(found, seen)
+    if not tumours or towards is None:
+        return {"next_touch_mm": None, "next_touch": None}
+    offered = touches(found, *_nodes_of(tumours[0], found), towards)
+    variance, drop = offered.trace_mm2, float(offered.drops_mm2[offered.best])
+    sigmas = {"rms_before_mm": float(np.sqrt(variance)), "rms_after_mm": float(np.sqrt(variance - drop))}
+    point = offered.points_mm[offered.best].tolist()
+    return {"next_touch_mm": point, "next_touch": {"tumour": tumours[0].name, **sigmas}}
+
+
+def _nodes_of(tumour: Tumour, found: Registered) -> tuple[IntArray, FloatArray]:
+    """Nodes (a,) of which the tumour's centroid is a mean, and their weights (a,)."""
+    locator = PointLocator(found.deformation.mesh)
+    location = locator.locate(tumour.centroid_mm)
+    return found.deformation.mesh.tetrahedra[location.elements[0]], locator.weights(location)[0]

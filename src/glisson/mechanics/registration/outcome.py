@@ -1,20 +1,14 @@
 """A fit as the answer that callers get."""
 
-import numpy as np
-
 from glisson.core.arrays import FloatArray
 from glisson.core.deformation import Deformation, StageResult
 from glisson.core.model import Model
 from glisson.core.registered import Registered
 from glisson.core.status import Status
-from glisson.mechanics.registration.fitting import Fit
-from glisson.mechanics.registration.motion import Motion
 from glisson.mechanics.registration.observability import unheld_motions
 
 STAGE = "registration"
 _SET_ASIDE = 0.25
-_LEAST_PRECISION = 1e-6
-"""Per mm²: what nothing determines has a standard deviation of a metre."""
 
 
 def outcome(
@@ -52,12 +46,3 @@ def outcome(
         set_aside=float((beliefs < _SET_ASIDE).mean()),
         forces_mn=forces_mn,
     )
-
-
-def posterior_spread(motion: Motion, found: Fit) -> FloatArray:
-    """Motion of all nodes (n, 3, size) by independent unknowns of unit variance, from the Gauss–Newton Hessian."""
-    values, vectors = np.linalg.eigh(found.hessian)
-    root = vectors / np.sqrt(np.maximum(values, _LEAST_PRECISION))
-    nodes = np.arange(len(motion.positions(found.state)))
-    spread: FloatArray = motion.derivative(found.state, nodes) @ root
-    return spread

@@ -12,9 +12,10 @@ from glisson.mechanics.registration.checks import check_last, check_observations
 from glisson.mechanics.registration.contradictions import contradiction, misfits
 from glisson.mechanics.registration.fitting import fit
 from glisson.mechanics.registration.motion import BasisMotion
-from glisson.mechanics.registration.outcome import outcome, posterior_spread
+from glisson.mechanics.registration.outcome import outcome
 from glisson.mechanics.registration.places import Places
 from glisson.mechanics.registration.placing import placed
+from glisson.mechanics.registration.posterior import INFLATION, model_error_spread, posterior_spread
 from glisson.mechanics.registration.seen import ModelError, Seen
 
 
@@ -40,6 +41,7 @@ class Prepared:
     def __init__(self, model: Model, error: ModelError, body: Deformable) -> None:
         self._model, self._error, self._body = model, error, body
         self._places = Places(model)
+        self._misfit_mm = model_error_spread(model.mesh, error)
 
     def register(
         self, observations: Observations, last: Registered | None = None, progress: Progress = silent
@@ -57,7 +59,8 @@ class Prepared:
         progress(0.4, "deforming the organ")
         found, off = self._fitted(observations, start)
         doubt = contradiction(observations, off, self._fits) or ambiguous
-        return outcome(self._model, observations.frame, found.positions, found.spread_mm, found.beliefs, doubt)
+        spread = INFLATION * np.concatenate([found.spread_mm, self._misfit_mm], axis=2)
+        return outcome(self._model, observations.frame, found.positions, spread, found.beliefs, doubt)
 
     def _fitted(self, observations: Observations, start: FloatArray) -> tuple[Deformed, tuple[str, ...]]:
         """The body fitted, and what does not fit."""

@@ -15,6 +15,9 @@ from glisson.mechanics.registration.rows import Rows, joined
 _TOUCHING_MM = 1e-6
 _ON_EDGE = 1e-9
 
+DRAWN_MM = 1.5
+"""A curve of the model, drawn by hand in the scan, is off by so much in each coordinate, all of it alike."""
+
 
 @dataclass(frozen=True)
 class ModelError:
@@ -214,6 +217,7 @@ def _errors(item: Observation, model: ModelError) -> PointErrors:
         own = np.tile(item.sigma_mm**2 * np.eye(3), (count, 1, 1))
     near = KDTree(item.points_mm).query_ball_point(item.points_mm, model.length_mm, return_length=True)
     variance, shared = np.trace(own, axis1=1, axis2=2) / 3.0, model.sigma_mm**2
+    drawn = DRAWN_MM**2 if item.kind == "curve" else 0.0
     # Points that are off together by the same error tell no more than one of them does.
-    worth = (variance + shared) / (variance + near * shared)
-    return PointErrors(own + shared * np.eye(3), worth)
+    worth = (variance + shared + drawn) / (variance + near * shared + count * drawn)
+    return PointErrors(own + (shared + drawn) * np.eye(3), worth)

@@ -42,11 +42,10 @@ TRUTH_EDGE_MM = 14.0
 """Some 10,000 quadratic elements, where the models under test are coarser and may be linear."""
 
 
-def truth_point(seed: int, member: int, packings: int) -> Point:
-    """The point that packs one liver in so many ways."""
-    return Point(
-        PACK, {"seed": seed, "member": member, "packings": packings, "edge_mm": TRUTH_EDGE_MM}, cost=packings + 0.6
-    )
+def truth_point(seed: int, member: int, packings: int, edge_mm: float | None = None) -> Point:
+    """The point that packs one liver in so many ways, with elements of that edge length (default `TRUTH_EDGE_MM`)."""
+    edge = TRUTH_EDGE_MM if edge_mm is None else edge_mm
+    return Point(PACK, {"seed": seed, "member": member, "packings": packings, "edge_mm": edge}, cost=packings + 0.6)
 
 
 def pack_liver(inputs: Mapping[str, Any], folder: Path) -> Outcome:
