@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from glisson.core.observations import Observation, Observations
-from glisson.framework.case import MODEL, OBSERVATIONS, Case
+from glisson.framework.case import MODEL, OBSERVATIONS, SCENARIO, Case
 from glisson.io.deformation_files import read_deformation
 from glisson.io.model_files import read_model
 from glisson.io.observation_files import write_observations
@@ -121,3 +121,11 @@ def test_forces_on_a_held_liver_are_found_or_told_why_not(case: Case, glisson: G
     assert "held" in said["message"]
     code, said = glisson("register", case.folder, "--technique", "forces", "--held", "nowhere")
     assert (code, "no node set" in said["message"]) == (2, True)
+
+
+def test_there_is_nothing_to_adjust_without_a_scenario(case: Case, glisson: Glisson) -> None:
+    write_observations(case.path(OBSERVATIONS), seen(case))
+    case.path(SCENARIO).unlink(missing_ok=True)
+    code, said = glisson("register", case.folder, "--technique", "scenario")
+    assert code == 2
+    assert "scenario.toml" in said["message"]

@@ -27,8 +27,17 @@ reported, so that 90 % regions hold 90 % of their targets (docs/registration.md)
 _MOST_PATCHES = 60
 
 
+def spread_by(hessian: FloatArray, motion: Motion, found: Fit) -> FloatArray:
+    """Motion of all nodes (n, 3, size) by independent unknowns of unit variance, from a Hessian (size, size)."""
+    values, vectors = np.linalg.eigh(hessian)
+    root = vectors / np.sqrt(np.maximum(values, _LEAST_PRECISION))
+    nodes = np.arange(len(motion.positions(found.state)))
+    spread: FloatArray = motion.derivative(found.state, nodes) @ root
+    return spread
+
+
 def posterior_spread(motion: Motion, found: Fit) -> FloatArray:
-    """Motion of all nodes (n, 3, size) by independent unknowns of unit variance.
+    """The same of an organ that moves rigidly and deforms at the cost of strain energy.
 
     The covariance is the inverse of the Gauss–Newton Hessian, in which the prior is as wide as the organ's own
     deformation says: the energy in the ways of deforming that were seen tells that in the others (empirical Bayes;
@@ -38,11 +47,7 @@ def posterior_spread(motion: Motion, found: Fit) -> FloatArray:
     held = found.hessian + _LEAST_PRECISION * np.eye(motion.size)
     seen = motion.size - 6 - float(np.trace(np.linalg.solve(held, prior)))
     share = (USUAL_MODES * USUAL_SHARE + 2.0 * cost) / (USUAL_MODES + seen)
-    values, vectors = np.linalg.eigh(found.hessian + (1.0 / share - 1.0) * prior)
-    root = vectors / np.sqrt(np.maximum(values, _LEAST_PRECISION))
-    nodes = np.arange(len(motion.positions(found.state)))
-    spread: FloatArray = motion.derivative(found.state, nodes) @ root
-    return spread
+    return spread_by(found.hessian + (1.0 / share - 1.0) * prior, motion, found)
 
 
 def model_error_spread(mesh: TetMesh, error: ModelError) -> FloatArray:

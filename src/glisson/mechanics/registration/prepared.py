@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
 from glisson.core.arrays import FloatArray
 from glisson.core.model import Model
 from glisson.core.observations import Observations

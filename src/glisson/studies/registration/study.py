@@ -9,6 +9,7 @@ from glisson.core.errors import StageFailed
 from glisson.core.registry import list_techniques
 from glisson.core.status import Status
 from glisson.mechanics.registration.forces import Forces
+from glisson.mechanics.registration.scenario import AdjustedScenario
 from glisson.navigation.figures.picture import Picture
 from glisson.phantom.sparse_data.design import CaseDesign, Design
 from glisson.studies.page import png
@@ -26,9 +27,9 @@ QUICK = {"livers": 1, "packings": 1, "views": 4, "bends": 2}
 
 
 def available_techniques() -> tuple[str, ...]:
-    """Names of the registrations that can be used here, where nothing is known to hold the organ in its place."""
+    """Names of the registrations that can be used where no manoeuvre is known, nor what holds the organ."""
     listed = [found.name for found in list_techniques(("registration",)) if found.is_available]
-    return tuple(name for name in listed if name != Forces.name)
+    return tuple(name for name in listed if name not in (Forces.name, AdjustedScenario.name))
 
 
 @dataclass(frozen=True)
