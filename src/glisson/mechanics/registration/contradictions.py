@@ -13,6 +13,11 @@ from glisson.mechanics.registration.seen import Seen
 _DOUBTED = 3.0
 """How many times further off than expected, in its median point, an observation is that does not fit."""
 
+_MOST_LEFT_OUT = 8
+"""Of so many observations each is left out in turn: it takes a whole registration."""
+
+_MOST_TOLD = 4
+
 
 def misfits(seen: Seen, rows: Rows) -> tuple[str, ...]:
     """What does not fit where the organ has come to rest, each with how far it is off.
@@ -44,8 +49,10 @@ def contradiction(observations: Observations, off: tuple[str, ...], fits: Callab
     if not off:
         return None
     items = [item for item in observations.items if len(item.points_mm)]
-    liars = [item for item in items if _fits_without(observations, item, fits)] if len(items) > 1 else []
-    sentence = f"What was seen does not fit together: {', '.join(off)} off after the best fit."
+    few = 1 < len(items) <= _MOST_LEFT_OUT
+    liars = [item for item in items if _fits_without(observations, item, fits)] if few else []
+    told = [*off[:_MOST_TOLD], *([f"{len(off) - _MOST_TOLD} more"] if len(off) > _MOST_TOLD else [])]
+    sentence = f"What was seen does not fit together: {', '.join(told)} off after the best fit."
     if liars:
         names = " or ".join(f"{item.kind} {item.name!r}" for item in liars)
         return f"{sentence} Without {names} the rest fits."
