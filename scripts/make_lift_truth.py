@@ -29,7 +29,7 @@ from glisson.phantom.calculix.rigid_bodies import lever_mesh
 from glisson.phantom.family import build_anatomy, scanned_structures
 from glisson.phantom.heterogeneity import VARIATION, Contains, uneven_moduli
 from glisson.phantom.implicit import Solid
-from glisson.phantom.lever_lift import LEVER_ANGLE_DEG, lever_lift
+from glisson.phantom.lever_lift import lever_lift
 from glisson.phantom.lift_truths import LIFT_TRUTHS, LiftTruth, lift_truth
 from glisson.phantom.scan import Anatomy
 from glisson.phantom.solid_surface import solid_surface
@@ -73,7 +73,7 @@ def young_moduli(mesh: TetMesh, anatomy: Anatomy, modulus_kpa: float) -> FloatAr
 def settings_of(truth: LiftTruth) -> LiftSettings:
     """Contact some 8 times as stiff per mm as the tissue, and the steps of the manoeuvre."""
     normal = 60.0 / 7.0 * truth.young_modulus_kpa
-    return LiftSettings(LEVER_ANGLE_DEG, truth.friction, normal_kpa_mm=normal, tangent_kpa_mm=0.2 * normal)
+    return LiftSettings(truth.angle_deg, truth.friction, normal_kpa_mm=normal, tangent_kpa_mm=0.2 * normal)
 
 
 def weights_of(mesh: TetMesh) -> FloatArray:
@@ -126,7 +126,7 @@ def export(
     write_truth(truth.path, mesh, scanned, stages, note)
 
 
-def report(truth: LiftTruth, anatomy: Anatomy, board: Board, lever: Lever, angle_deg: float) -> None:
+def report(truth: LiftTruth, anatomy: Anatomy, board: Board, lever: Lever) -> None:
     """Say what the written truth is worth."""
     written = truth.read()
     deformation, loading = written.deformation, written.loading
@@ -137,7 +137,7 @@ def report(truth: LiftTruth, anatomy: Anatomy, board: Board, lever: Lever, angle
     outer = surface_nodes(rest)
     for stage in deformation.stages:
         nodes = scanned.moved(stage.displacement)
-        gap = gap_to_lever(nodes[outer], lever, radians(angle_deg))
+        gap = gap_to_lever(nodes[outer], lever, radians(truth.angle_deg))
         height = height_over_board(nodes[outer], board)
         say(
             f"{stage.name}: smallest Jacobian {smallest_jacobian(rest, nodes):.3f}, largest displacement "
@@ -185,7 +185,7 @@ def main() -> int:
         return 1
     say(f"CalculiX: {time.monotonic() - start:.0f} s")
     export(work, truth, organ, lever, steps, settings)
-    report(truth, anatomy, board, lever, LEVER_ANGLE_DEG)
+    report(truth, anatomy, board, lever)
     return 0
 
 

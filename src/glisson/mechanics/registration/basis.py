@@ -1,5 +1,6 @@
 """Displacements of an elastic body whose surface is moved at a few control points."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,12 +15,13 @@ from glisson.geometry.quadratic import straight_boundary
 from glisson.geometry.spreading import evenly_spread
 from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.linear_solvers import make_direct_solver
+from glisson.mechanics.loads import fixed_unknowns
 from glisson.mechanics.pattern import FreeSystem, Stiffness, block_pattern
 
 
 @dataclass(frozen=True, eq=False)
 class ElasticModes:
-    """Displacements Φ (n, 3, k), each of a root mean square of 1 mm and free of rigid motion, the softest first.
+    """Displacements Φ (n, 3, k), each of a root mean square of 1 mm, the softest first.
 
     `energies_uj` (k,) is the strain energy of each; different ones have none in common.
     """
@@ -28,21 +30,26 @@ class ElasticModes:
     energies_uj: FloatArray
 
 
-def boundary_responses(model: Model, count: int) -> ElasticModes:
+def boundary_responses(model: Model, count: int, held: Sequence[str] = ()) -> ElasticModes:
     """Linear elastic responses at rest to the motion of control nodes that are spread evenly over the surface.
+
+    Args:
+        model: the organ.
+        count: of the control nodes.
+        held: node sets that stay where they are; without any the modes are free of rigid motion.
 
     Raises:
         StageFailed: the body falls apart.
     """
     mesh = model.mesh
     triangles, _ = straight_boundary(mesh)
-    surface = np.unique(triangles)
+    fixed = fixed_unknowns(model, tuple(held))
+    surface = np.setdiff1d(triangles, np.flatnonzero(fixed.any(axis=1)))
     controls = surface[evenly_spread(mesh.nodes[surface], count)]
     elasticity = Elasticity(mesh, model.materials, mesh.nodes)
     pattern = block_pattern(mesh.tetrahedra, len(mesh.nodes))
     blocks = np.zeros((pattern.block_count, 3, 3))
     elasticity.add_stiffness(mesh.nodes, pattern, blocks, project=True)
-    fixed = np.zeros((len(mesh.nodes), 3), dtype=np.bool_)
     fixed[controls] = True
     system = FreeSystem(pattern, fixed)
     solver = make_direct_solver()
@@ -62,8 +69,8 @@ def boundary_responses(model: Model, count: int) -> ElasticModes:
     finally:
         solver.close()
     flat = basis.reshape(-1, basis.shape[2])
-    # The six of no energy are the rigid motions, of which a motion has its own unknowns.
-    return elastic_modes(basis, flat.T @ (matrix @ flat), rigid=6)
+    # Six of no energy are the rigid motions of what is not held, of which a motion has its own unknowns.
+    return elastic_modes(basis, flat.T @ (matrix @ flat), rigid=0 if len(held) else 6)
 
 
 def elastic_modes(basis: FloatArray, stiffness: FloatArray, rigid: int = 0) -> ElasticModes:
