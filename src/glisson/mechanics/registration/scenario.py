@@ -21,6 +21,7 @@ from glisson.mechanics.registration.elastic_parameters import ERROR_HELP, LENGTH
 from glisson.mechanics.registration.expected_energy import energy_per_mode_uj
 from glisson.mechanics.registration.fitting import Fit, fit
 from glisson.mechanics.registration.outcome import outcome, posterior_spread
+from glisson.mechanics.registration.places import Places
 from glisson.mechanics.registration.scenario_forward import Manoeuvres
 from glisson.mechanics.registration.scenario_motion import ScenarioMotion, Tangent
 from glisson.mechanics.registration.scenario_unknowns import Doubt, ScenarioUnknowns
@@ -112,7 +113,7 @@ class PreparedScenario:
         tangent: Tangent,
         modes: ElasticModes,
     ) -> None:
-        self._model, self._parameters = model, parameters
+        self._model, self._parameters, self._places = model, parameters, Places(model)
         self._unknowns, self._manoeuvres, self._planned, self._modes = unknowns, manoeuvres, tangent, modes
 
     def register(
@@ -131,7 +132,7 @@ class PreparedScenario:
                 "transform them into that of the patient first."
             )
         error = ModelError(self._parameters.model_error_mm, self._parameters.model_error_length_mm)
-        seen = Seen(self._model, observations, error)
+        seen = Seen(self._places, observations, error)
         tangent, found, settled = self._planned, None, False
         for number in range(self._parameters.solves):
             progress(number / self._parameters.solves, "adjusting the manoeuvre")

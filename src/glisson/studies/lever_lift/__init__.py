@@ -1,0 +1,1 @@
+"""How well the adjusted manoeuvre tells where tumour, plane and surface are after a lever lift."""
