@@ -52,9 +52,7 @@ class ScenarioParameters:
     @property
     def doubt(self) -> Doubt:
         """What of it concerns the plan."""
-        return Doubt(
-            self.angle_deg, self.place_mm, self.friction_factor, self.stiffness_factor, self.attachment_factor
-        )
+        return Doubt(self.angle_deg, self.place_mm, self.friction_factor, self.stiffness_factor, self.attachment_factor)
 
 
 class AdjustedScenario:
@@ -178,4 +176,3 @@ class PreparedScenario:
         untold = [u.name for u, width in zip(self._unknowns.every, sigma, strict=True) if width > _UNTOLD]
         notes = [f"The manoeuvre as it was: {self._unknowns.told(amounts, sigma)}."]
         return notes + [f"Nothing that was seen tells {name}; it is as planned." for name in untold]
-

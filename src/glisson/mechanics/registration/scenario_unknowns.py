@@ -14,6 +14,8 @@ from glisson.mechanics.lever_tool import LeverTool
 
 Plan = tuple[Model, Scenario]
 
+_BELOW_MM = 100.0
+
 
 @dataclass(frozen=True)
 class Doubt:
@@ -74,9 +76,11 @@ class ScenarioUnknowns:
         return ", ".join(unknown.told(float(amount), float(width)) for unknown, amount, width in each)
 
     def lever_gaps(self, name: str, points_mm: FloatArray, amounts: FloatArray) -> FloatArray:
-        """Distance (n,) of points (n, 3) from the lever `name` where the manoeuvre ends, negative inside, mm."""
+        """Distance (n,) of points (n, 3) from the upper side of the lever `name` where the manoeuvre ends, negative within, mm."""
         _, scenario = self.at(amounts)
-        tool = LeverTool(_lever(scenario, name))
+        lever = _lever(scenario, name)
+        # The organ lies on it, so what is deep inside the bar came from above, not from the nearer underside.
+        tool = LeverTool(replace(lever, thickness_mm=lever.thickness_mm + _BELOW_MM))
         axes, origin = tool.pose(np.radians(_angle_deg(scenario, name)))
         return tool.distance((points_mm - origin) @ axes)
 
