@@ -13,6 +13,7 @@ from glisson.studies.contact.study import ContactStudy
 from glisson.studies.dask_cluster import DaskCluster
 from glisson.studies.elements.study import Elements
 from glisson.studies.executor import Executor
+from glisson.studies.lever_lift.study import LeverLift
 from glisson.studies.lift_robustness.study import LiftRobustness
 from glisson.studies.local_pool import LocalPool
 from glisson.studies.region.study import RegionStudy
@@ -27,6 +28,7 @@ from glisson.studies.ventilation.study import VentilationStudy
 STUDIES = {
     "contact": "how far the tumour is apart with our contact and with that of the IPC Toolkit",
     "elements": "how much error linear and quadratic elements leave in the same time",
+    "lever-lift": "how well tumour, plane and surface are told after a lever lift from a few things that were seen",
     "lift-robustness": "whether the lever lift converges whatever liver, lever, tissue and contact",
     "region": "how much faster a lift is by its region of interest, and what that costs",
     "segmentation": "how well the liver is found in scans of the phantom family, and whether failures are flagged",
@@ -40,8 +42,8 @@ STUDIES = {
 
 _OWN_OPTIONS = {
     "seed": (
-        LiftRobustness.name, ContactStudy.name, SparseDataTwin.name, SurfaceStudy.name, TrocarStudy.name,
-        VentilationStudy.name,
+        LeverLift.name, LiftRobustness.name, ContactStudy.name, SparseDataTwin.name, SurfaceStudy.name,
+        TrocarStudy.name, VentilationStudy.name,
     ),
     "long": (Sensitivity.name,),
     "element": (Sensitivity.name,),
@@ -89,6 +91,8 @@ def _study(arguments: argparse.Namespace) -> Study:
         if getattr(arguments, option) and arguments.study not in studies:
             raise BadInput(f"{arguments.study} has no --{option}; that is for the study {', '.join(studies)}.")
     seed = whole_number(arguments.seed, "--seed", 0) or 0
+    if arguments.study == LeverLift.name:
+        return LeverLift.of(arguments.quick, seed)
     if arguments.study == LiftRobustness.name:
         return LiftRobustness.of(arguments.quick, seed)
     if arguments.study == ContactStudy.name:

@@ -59,8 +59,8 @@ class AdjustedScenario:
     """The loop of the dissertation's section 3.2.3, and a small elastic correction by boundary responses on top.
 
     Before surgery the plan is solved, and once more for each unknown. Then Gauss–Newton steps of all unknowns and the
-    correction together go by that derivative; the adjusted manoeuvre is solved in full, the derivative learns from it, and
-    so on until what it predicts is what is solved.
+    correction together go by that derivative; the adjusted manoeuvre is solved in full, the derivative learns from it,
+    and so on until what it predicts is what is solved.
     """
 
     name: ClassVar[str] = "scenario"
@@ -89,30 +89,40 @@ class AdjustedScenario:
                 "The technique scenario adjusts a planned manoeuvre, and there is none; give the case a scenario.toml "
                 "or choose another technique."
             )
-        unknowns = ScenarioUnknowns(model, scenario, self._parameters.doubt)
-        manoeuvres = Manoeuvres(unknowns)
-        tangent = manoeuvres.tangent(progress)
-        progress(0.95, "how else the organ can deform")
+        manoeuvres = Manoeuvres(ScenarioUnknowns(model, scenario, self._parameters.doubt))
+        return self.with_tangent(model, scenario, manoeuvres.tangent(progress))
+
+    def with_tangent(self, model: Model, scenario: Scenario, tangent: Tangent) -> "PreparedScenario":
+        """The same where the plan and its derivative are known already."""
         organ = quadratic_model(model)
         there = replace(organ, mesh=replace(organ.mesh, nodes=tangent.positions))
         modes = boundary_responses(there, self._parameters.controls, scenario.stages[-1].fixed)
-        return PreparedScenario(organ, self._parameters, unknowns, manoeuvres, tangent, modes)
+        unknowns = ScenarioUnknowns(model, scenario, self._parameters.doubt)
+        return PreparedScenario(organ, self._parameters, unknowns, tangent, modes)
 
 
 class PreparedScenario:
-    """A plan that was solved; see `PreparedRegistration`."""
+    """A plan that was solved (see `PreparedRegistration`).
+
+    Args:
+        model: with quadratic elements.
+        parameters: of the technique.
+        unknowns: of the plan.
+        tangent: the plan's end, and how it depends on the unknowns.
+        modes: how else the organ can deform there.
+    """
 
     def __init__(
         self,
         model: Model,
         parameters: ScenarioParameters,
         unknowns: ScenarioUnknowns,
-        manoeuvres: Manoeuvres,
         tangent: Tangent,
         modes: ElasticModes,
     ) -> None:
         self._model, self._parameters, self._places = model, parameters, Places(model)
-        self._unknowns, self._manoeuvres, self._planned, self._modes = unknowns, manoeuvres, tangent, modes
+        self._unknowns, self._manoeuvres, self._modes = unknowns, Manoeuvres(unknowns), modes
+        self.tangent = tangent
 
     def register(
         self, observations: Observations, last: Registered | None = None, progress: Progress = silent
@@ -131,7 +141,7 @@ class PreparedScenario:
             )
         error = ModelError(self._parameters.model_error_mm, self._parameters.model_error_length_mm)
         seen = Seen(self._places, observations, error)
-        tangent, found, settled = self._planned, None, False
+        tangent, found, settled = self.tangent, None, False
         for number in range(self._parameters.solves):
             progress(number / self._parameters.solves, "adjusting the manoeuvre")
             motion, found = self._fitted(tangent, seen, observations, found)

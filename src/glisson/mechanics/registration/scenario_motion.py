@@ -14,7 +14,7 @@ _STEP = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Tangent:
-    """Nodes (n, 3) at the end of a solved manoeuvre with the unknowns at `amounts` (k,), and their derivative (n, 3, k)."""
+    """Nodes (n, 3) at the end of a manoeuvre with its unknowns at `amounts` (k,), and their derivative (n, 3, k)."""
 
     amounts: FloatArray
     positions: FloatArray
@@ -35,8 +35,8 @@ class Tangent:
 class ScenarioMotion:
     """x = x₀ + U (p − p₀) + Φ a: p are a manoeuvre's unknowns, Φ what it cannot explain (see `Motion`).
 
-    Its unknowns are p before a; there is no rigid motion, since the tools are known in the patient's frame. p costs ½ pᵀ p,
-    and what contacts seen on a lever are away from it; a costs ½ aᵀ P a.
+    Its unknowns are p before a; there is no rigid motion, since the tools are known in the patient's frame. p costs
+    ½ pᵀ p, and what contacts seen on a lever are away from it; a costs ½ aᵀ P a.
 
     Args:
         unknowns: of the manoeuvre.

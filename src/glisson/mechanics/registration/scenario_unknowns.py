@@ -19,7 +19,7 @@ _BELOW_MM = 100.0
 
 @dataclass(frozen=True)
 class Doubt:
-    """Standard deviations around a plan: of angles (degrees), places (mm), and as factors of what cannot be negative."""
+    """Standard deviations around a plan: of angles (degrees), places (mm), and factors of what cannot be negative."""
 
     angle_deg: float
     place_mm: float
@@ -76,7 +76,7 @@ class ScenarioUnknowns:
         return ", ".join(unknown.told(float(amount), float(width)) for unknown, amount, width in each)
 
     def lever_gaps(self, name: str, points_mm: FloatArray, amounts: FloatArray) -> FloatArray:
-        """Distance (n,) of points (n, 3) from the upper side of the lever `name` where the manoeuvre ends, negative within, mm."""
+        """Distance (n,) in mm of points (n, 3) from a lever's upper side at the manoeuvre's end, negative below it."""
         _, scenario = self.at(amounts)
         lever = _lever(scenario, name)
         # The organ lies on it, so what is deep inside the bar came from above, not from the nearer underside.

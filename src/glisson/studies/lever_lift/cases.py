@@ -24,9 +24,9 @@ _ANGLE_OFF_DEG, _PLACE_OFF_MM = 3.0, 3.0
 class LeverCase:
     """One lift.
 
-    The truth turns the lever to `angle_deg` from a hinge that is off the family's by `placed_mm` along its arm and along
-    its axis; the plan has an angle and a place that are off the truth by `angle_off_deg` and `place_off_mm`.
-    `calculix` names the truth of `UNSEEN_TRUTHS` that was solved by the other engine; None: our own, finer and different.
+    The truth turns the lever to `angle_deg` from a hinge that is off the family's by `placed_mm` along its arm and its
+    axis; the plan has an angle and a place that are off the truth by `angle_off_deg` and `place_off_mm`. `calculix`
+    names the truth of `UNSEEN_TRUTHS` that the other engine has solved; None: our own, finer and different.
     """
 
     member: int

@@ -62,11 +62,13 @@ def front(surface: TriangleSurface) -> FloatArray:
     far, normals = TriangleScene(surface).hits(_CAMERA_MM, rays)
     seen = np.isfinite(far) & ((rays * normals).sum(axis=1) < -_FACING)
     points = _CAMERA_MM + far[seen, None] * rays[seen]
-    return points[thinned(points, _APART_MM)]
+    kept: FloatArray = points[thinned(points, _APART_MM)]
+    return kept
 
 
 def _along_wire(truth: Deformation, structures: Structures) -> FloatArray:
     duct, length = structures.duct, structures.wire_length_mm
-    assert duct is not None and length is not None  # every member has a wire
+    assert duct is not None  # every member has a wire
+    assert length is not None
     wire, _ = carried_wire(duct, length, PointMap(truth.mesh, truth.displacement))
     return evenly_along(Curve(wire.points_mm), _WIRE_STEP_MM)

@@ -1,7 +1,6 @@
 """A technique on a lift: how far tumour, plane, removed part and surface are off, and what doing less leaves."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,24 +9,18 @@ from scipy.stats import chi2
 
 from glisson.core.arrays import FloatArray
 from glisson.core.deformation import Deformation
-from glisson.core.model import Material, Model
+from glisson.core.model import Model
 from glisson.core.registered import Registered
-from glisson.core.registry import make_technique
-from glisson.core.structures import Structures
 from glisson.geometry.location import PointLocator
 from glisson.geometry.mapping import PointMap
-from glisson.geometry.quadratic import boundary_surface
 from glisson.geometry.spreading import evenly_spread
 from glisson.navigation.guidance import navigate
 from glisson.navigation.plan import Plan
-from glisson.phantom.lift_truths import lift_truth
-from glisson.phantom.proportions import draw_proportions
-from glisson.preoperative.meshing.mmg import Mmg, MmgParameters
-from glisson.studies.lever_lift.cases import LeverCase, planned_scenario
+from glisson.studies.lever_lift.cases import planned_scenario
 from glisson.studies.lever_lift.observing import observe
+from glisson.studies.lever_lift.planning import FRICTION, read_plan, technique_of
 from glisson.studies.lever_lift.truths import PACKAGES, case_of, read_truth, structures_of
-from glisson.studies.lifts import carried_centroid, lift_model, rigidly_moved
-from glisson.studies.meshing import member_surface
+from glisson.studies.lifts import carried_centroid, rigidly_moved
 from glisson.studies.point import Outcome, Point, Task
 
 SCORE = Task(
@@ -38,45 +31,23 @@ SCORE = Task(
     ),
 )  # fmt: skip
 
-TISSUE, FRICTION = Material("neo-hookean", 7.0, 0.45), 0.2
-"""What a user who has measured nothing would take."""
-
 TARGET = "tumour1"
 _SURFACE_POINTS = 400
 
 
-def score_point(truth: Point, parameters: Mapping[str, Any], edge_mm: float, envelope_mm: float) -> Point:
-    """The point that registers the case of a truth's point."""
-    inputs = {
-        "case": truth.inputs["case"],
-        "truth": truth.key,
-        "parameters": dict(parameters),
-        "edge_mm": edge_mm,
-        "envelope_mm": envelope_mm,
-    }
-    return Point(SCORE, inputs, cost=15.0)
+def score_point(plan: Point, truth: Point) -> Point:
+    """The point that registers a planned case to what was seen of its truth."""
+    return Point(SCORE, {**plan.inputs, "plan": plan.key, "truth": truth.key}, cost=3.0)
 
 
 def score_case(inputs: Mapping[str, Any], folder: Path) -> Outcome:
     """Observe a lift, register the model to it, and compare with the truth."""
     case, truth = case_of(inputs), read_truth(folder, inputs["truth"])
     structures = structures_of(case)
-    model = model_of(case, structures, inputs["edge_mm"], inputs["envelope_mm"])
-    technique = make_technique("registration", "scenario", inputs["parameters"], "scenario")
-    prepared = technique.prepare(model, planned_scenario(case, FRICTION))
-    found: Registered = prepared.register(observe(case, truth, structures))
-    values = scores(found, model, truth)
-    return Outcome(values, {}, found.status, found.deformation.message)
-
-
-def model_of(case: LeverCase, structures: Structures, edge_mm: float, envelope_mm: float) -> Model:
-    """The model that a user would have of a liver: its scanned surface, coarse, of one tissue throughout."""
-    if case.calculix is None:
-        surface = member_surface(draw_proportions(case.member))
-    else:
-        surface = boundary_surface(lift_truth(case.calculix).read().deformation.mesh)
-    mesh = Mmg(MmgParameters(edge_length_mm=edge_mm, envelope_mm=envelope_mm)).mesh(surface)
-    return replace(lift_model(mesh, TISSUE), structures=structures)
+    model, tangent = read_plan(folder, inputs["plan"], structures)
+    prepared = technique_of(inputs).with_tangent(model, planned_scenario(case, FRICTION), tangent)
+    found = prepared.register(observe(case, truth, structures))
+    return Outcome(scores(found, model, truth), {}, found.status, found.deformation.message)
 
 
 def scores(found: Registered, model: Model, truth: Deformation) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 from glisson.core.errors import StageFailed
 from glisson.core.registry import list_techniques
 from glisson.core.status import Status
+from glisson.mechanics.registration.scenario import AdjustedScenario
 from glisson.navigation.figures.picture import Picture
 from glisson.phantom.sparse_data.design import CaseDesign, Design
 from glisson.studies.page import png
@@ -25,8 +26,9 @@ QUICK = {"livers": 1, "packings": 1, "views": 4, "bends": 2}
 
 
 def available_techniques() -> tuple[str, ...]:
-    """Names of the registrations that can be used here."""
-    return tuple(found.name for found in list_techniques(("registration",)) if found.is_available)
+    """Names of the registrations that can be used here: there is no manoeuvre that could be adjusted."""
+    listed = [found.name for found in list_techniques(("registration",)) if found.is_available]
+    return tuple(name for name in listed if name != AdjustedScenario.name)
 
 
 @dataclass(frozen=True)
