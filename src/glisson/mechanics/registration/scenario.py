@@ -44,9 +44,9 @@ class ScenarioParameters:
     stiffness_factor: float = parameter(1.5, "by which factor stiffness may be off", minimum=1.001)
     attachment_factor: float = parameter(3.0, "by which factor the attachments' stiffness may be off", minimum=1.001)
     controls: int = parameter(45, "number of points of the surface that move beyond the manoeuvre", minimum=3)
-    strain: float = parameter(0.02, "typical strain that the manoeuvre cannot explain", minimum=1e-4)
+    strain: float = parameter(0.01, "typical strain that the manoeuvre cannot explain", minimum=1e-4)
     solves: int = parameter(4, "how often the adjusted manoeuvre is solved at most", minimum=1)
-    model_error_mm: float = parameter(0.5, ERROR_HELP, minimum=1e-3)
+    model_error_mm: float = parameter(0.3, ERROR_HELP, minimum=1e-3)
     model_error_length_mm: float = parameter(20.0, LENGTH_HELP, minimum=1e-3)
 
     @property
