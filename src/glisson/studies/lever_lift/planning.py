@@ -8,6 +8,7 @@ from typing import Any
 from glisson.core.mesh import TetMesh
 from glisson.core.model import Material, Model
 from glisson.core.parameters import build_parameters
+from glisson.core.scenario import Scenario
 from glisson.core.structures import Structures
 from glisson.geometry.quadratic import boundary_surface
 from glisson.mechanics.registration.scenario import AdjustedScenario, ScenarioParameters
@@ -30,6 +31,9 @@ PLAN = Task(
 TISSUE, FRICTION = Material("neo-hookean", 7.0, 0.45), 0.2
 """What a user who has measured nothing would take."""
 
+_LIGAMENTS_KPA_MM = 0.5
+"""The organ's back gives way by this, which can be adjusted; the truth holds a smaller part of it fast."""
+
 
 def plan_point(truth: Point, parameters: Mapping[str, Any], edge_mm: float, envelope_mm: float) -> Point:
     """The point that plans the case of a truth's point."""
@@ -41,7 +45,7 @@ def solve_plan(inputs: Mapping[str, Any], folder: Path) -> Outcome:
     """Mesh in A, and the planned lift with its derivatives."""
     case = case_of(inputs)
     model = model_of(case, structures_of(case), inputs["edge_mm"], inputs["envelope_mm"])
-    tangent = technique_of(inputs).prepare(model, planned_scenario(case, FRICTION)).tangent
+    tangent = technique_of(inputs).prepare(model, planned(case)).tangent
     arrays = {
         "nodes": model.mesh.nodes,
         "tetrahedra": model.mesh.tetrahedra,
@@ -61,7 +65,7 @@ def read_plan(folder: Path, key: str, structures: Structures) -> tuple[Model, Ta
     arrays = read_arrays(folder, key)
     mesh = TetMesh(arrays["nodes"], arrays["tetrahedra"])
     tangent = Tangent(arrays["amounts"], arrays["positions"], arrays["derivative"])
-    return replace(lift_model(mesh, TISSUE), structures=structures), tangent
+    return _model(mesh, structures), tangent
 
 
 def technique_of(inputs: Mapping[str, Any]) -> AdjustedScenario:
@@ -76,4 +80,15 @@ def model_of(case: LeverCase, structures: Structures, edge_mm: float, envelope_m
     else:
         surface = boundary_surface(lift_truth(case.calculix).read().deformation.mesh)
     mesh = Mmg(MmgParameters(edge_length_mm=edge_mm, envelope_mm=envelope_mm)).mesh(surface)
-    return replace(lift_model(mesh, TISSUE), structures=structures)
+    return _model(mesh, structures)
+
+
+def planned(case: LeverCase) -> Scenario:
+    """The planned lift, in which nothing is held fast."""
+    scenario = planned_scenario(case, FRICTION)
+    return replace(scenario, stages=tuple(replace(stage, fixed=()) for stage in scenario.stages))
+
+
+def _model(mesh: TetMesh, structures: Structures) -> Model:
+    model = lift_model(mesh, TISSUE)
+    return replace(model, structures=structures, ligaments=dict.fromkeys(model.node_sets, _LIGAMENTS_KPA_MM))

@@ -16,9 +16,8 @@ from glisson.geometry.mapping import PointMap
 from glisson.geometry.spreading import evenly_spread
 from glisson.navigation.guidance import navigate
 from glisson.navigation.plan import Plan
-from glisson.studies.lever_lift.cases import planned_scenario
 from glisson.studies.lever_lift.observing import observe
-from glisson.studies.lever_lift.planning import FRICTION, read_plan, technique_of
+from glisson.studies.lever_lift.planning import planned, read_plan, technique_of
 from glisson.studies.lever_lift.truths import PACKAGES, case_of, read_truth, structures_of
 from glisson.studies.lifts import carried_centroid, rigidly_moved
 from glisson.studies.point import Outcome, Point, Task
@@ -45,7 +44,7 @@ def score_case(inputs: Mapping[str, Any], folder: Path) -> Outcome:
     case, truth = case_of(inputs), read_truth(folder, inputs["truth"])
     structures = structures_of(case)
     model, tangent = read_plan(folder, inputs["plan"], structures)
-    prepared = technique_of(inputs).with_tangent(model, planned_scenario(case, FRICTION), tangent)
+    prepared = technique_of(inputs).with_tangent(model, planned(case), tangent)
     found = prepared.register(observe(case, truth, structures))
     return Outcome(scores(found, model, truth), {}, found.status, found.deformation.message)
 
