@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from glisson.core.observations import Observation, Observations
-from glisson.framework.case import MODEL, OBSERVATIONS, Case
+from glisson.framework.case import MODEL, OBSERVATIONS, SCENARIO, Case
 from glisson.io.deformation_files import read_deformation
 from glisson.io.model_files import read_model
 from glisson.io.observation_files import write_observations
@@ -83,3 +83,11 @@ def test_frames_follow_one_another(case: Case, glisson: Glisson, tmp_path: Path)
     code, said = glisson("register", case.folder, "--observations", files[0])
     assert code == 2
     assert "holds no observations" in said["message"]
+
+
+def test_there_is_nothing_to_adjust_without_a_scenario(case: Case, glisson: Glisson) -> None:
+    write_observations(case.path(OBSERVATIONS), seen(case))
+    case.path(SCENARIO).unlink(missing_ok=True)
+    code, said = glisson("register", case.folder, "--technique", "scenario")
+    assert code == 2
+    assert "scenario.toml" in said["message"]
