@@ -21,6 +21,7 @@ from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
 from glisson.mechanics.registration.basis import boundary_responses
 from glisson.mechanics.registration.fitting import _at
 from glisson.mechanics.registration.places import Places
+from glisson.mechanics.registration.scenario_forward import Manoeuvres
 from glisson.mechanics.registration.scenario_motion import ScenarioMotion, Tangent
 from glisson.mechanics.registration.scenario_unknowns import Doubt, ScenarioUnknowns
 from glisson.mechanics.registration.seen import ModelError, Seen
@@ -165,3 +166,20 @@ def test_stiffness_and_attachments_are_scaled_as_told() -> None:
     tip = HINGE + [2.0, 0.0, 0.0] + 30.0 * np.array([np.cos(np.radians(15.0)), 0.0, np.sin(np.radians(15.0))])
     amounts = np.array([1.0, 0.5, 0.0, 0.0, 0.0, 0.0])
     assert unknowns.lever_gaps("lever", tip[None], amounts) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_what_is_solved_is_what_was_wanted_or_half_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    unknowns = ScenarioUnknowns(block_model((7, 2, 1)), lift(PLANNED_DEG), Doubt(5.0, 4.0, 2.0, 1.5, 3.0))
+    rng = np.random.default_rng(3)
+    start, wanted = rng.normal(size=(2, len(unknowns.every)))
+    manoeuvres = Manoeuvres(unknowns)
+    monkeypatch.setattr(manoeuvres, "_positions", lambda amounts: amounts)
+    assert np.array_equal(manoeuvres.solved_towards(start, wanted)[0], wanted)
+
+    def only_near(amounts: np.ndarray) -> np.ndarray:
+        if np.array_equal(amounts, wanted):
+            raise StageFailed("Too far.", Status.INVERTED)
+        return amounts
+
+    monkeypatch.setattr(manoeuvres, "_positions", only_near)
+    assert manoeuvres.solved_towards(start, wanted)[0] == pytest.approx(0.5 * (start + wanted))

@@ -52,7 +52,8 @@ class Manoeuvres:
             StageFailed: there is none.
         """
         for halving in range(_HALVINGS):
-            amounts = start + 0.5**halving * (wanted - start)
+            # Written so that no rounding is in the first: it is compared with what was wanted.
+            amounts = wanted - (1.0 - 0.5**halving) * (wanted - start)
             try:
                 return amounts, self._positions(amounts)
             except StageFailed as failure:
