@@ -148,5 +148,7 @@ def test_the_command_counts(glisson: Glisson, tmp_path, monkeypatch) -> None:
 def test_an_option_of_another_study_is_refused(glisson: Glisson, tmp_path) -> None:
     code, said = glisson("study", "region", "--seed", "5", "--out", tmp_path / "s")
     assert (code, said["status"]) == (2, "bad_input")
-    assert said["message"].startswith("region has no --seed; that is for the study lever-lift, lift-robustness, contact, ")
+    assert said["message"].startswith(
+        "region has no --seed; that is for the study lever-lift, lift-robustness, contact, "
+    )
     assert not (tmp_path / "s").exists()

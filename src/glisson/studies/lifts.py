@@ -5,6 +5,7 @@ from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from glisson.core.arrays import FloatArray
@@ -13,7 +14,9 @@ from glisson.core.mesh import TetMesh, TriangleSurface
 from glisson.core.model import Material, Model
 from glisson.core.scenario import ContactLaw, Scenario
 from glisson.core.structures import Tumour
+from glisson.geometry.distance import SurfaceTree
 from glisson.geometry.mapping import PointMap
+from glisson.phantom.heterogeneity import Contains
 from glisson.preoperative.model.attachments import DEFAULT_ATTACHMENTS, node_sets
 from glisson.preoperative.model.model_building import ModelSettings
 from glisson.preoperative.model.regions import ORGAN
@@ -75,3 +78,17 @@ def rigidly_moved(deformation: Deformation, point: FloatArray) -> FloatArray:
     turn, _ = Rotation.align_vectors(after - after.mean(axis=0), before - before.mean(axis=0))
     moved: FloatArray = turn.apply(point - before.mean(axis=0)) + after.mean(axis=0)
     return moved
+
+
+def inside(tumour: Tumour) -> Contains:
+    """Which points (..., 3) lie in a tumour."""
+    surface = tumour.surface
+    tree = SurfaceTree(surface.vertices, surface.triangles)
+    low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
+
+    def contains(points: FloatArray) -> NDArray[np.bool_]:
+        within: NDArray[np.bool_] = ((points > low) & (points < high)).all(axis=-1)
+        within[within] = tree.contains(points[within])
+        return within
+
+    return contains

@@ -6,25 +6,21 @@ from pathlib import Path
 from pkgutil import iter_modules
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from glisson import mechanics
-from glisson.core.arrays import FloatArray
 from glisson.core.deformation import Deformation, StageResult
 from glisson.core.mesh import TetMesh
 from glisson.core.model import Material, Model
 from glisson.core.status import Status
-from glisson.core.structures import Structures, Tumour
-from glisson.geometry.distance import SurfaceTree
+from glisson.core.structures import Structures
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
 from glisson.phantom.family import build_anatomy, scanned_structures
-from glisson.phantom.heterogeneity import Contains, stiffness_levels, uneven_moduli
+from glisson.phantom.heterogeneity import stiffness_levels, uneven_moduli
 from glisson.phantom.lift_truths import lift_truth
 from glisson.phantom.proportions import draw_proportions
 from glisson.preoperative.meshing.mmg import Mmg, MmgParameters
 from glisson.preoperative.model.attachments import DirectionAttachment, node_sets
 from glisson.studies.lever_lift.cases import LeverCase, true_scenario
+from glisson.studies.lifts import inside
 from glisson.studies.meshing import member_surface
 from glisson.studies.point import Outcome, Point, Task
 from glisson.studies.store import read_arrays
@@ -37,7 +33,7 @@ _SOLVER = tuple(
 """The solver without what is under test or does not serve here: no truth is made anew because that has changed."""
 
 PACKAGES = (
-    "glisson.core", "glisson.geometry", "glisson.phantom", "glisson.studies.meshing",
+    "glisson.core", "glisson.geometry", "glisson.phantom", "glisson.studies.lifts", "glisson.studies.meshing",
     "glisson.studies.lever_lift.cases",
 )  # fmt: skip
 TRUTH = Task(f"{__name__}:solve_truth", (*PACKAGES, *_SOLVER, "glisson.preoperative", __name__))
@@ -98,7 +94,7 @@ def _solved(case: LeverCase, edge_mm: float, envelope_mm: float) -> Deformation:
     """Another law, tissue that varies by ±15 %, stiffer tumours, another attachment than the model under test has."""
     surface = member_surface(draw_proportions(case.member))
     mesh = Mmg(MmgParameters(edge_length_mm=edge_mm, envelope_mm=envelope_mm)).mesh(surface)
-    tumours = [_contains(tumour) for tumour in structures_of(case).tumours]
+    tumours = [inside(tumour) for tumour in structures_of(case).tumours]
     levels, means = stiffness_levels(uneven_moduli(mesh, case.young_modulus_kpa, tumours), _LEVELS)
     model = Model(
         TetMesh(mesh.nodes, mesh.tetrahedra, levels),
@@ -107,16 +103,3 @@ def _solved(case: LeverCase, edge_mm: float, envelope_mm: float) -> Deformation:
         node_sets(mesh, [_ATTACHMENT]),
     )
     return QuasiStatic(QuasiStaticParameters()).solve(model, true_scenario(case))
-
-
-def _contains(tumour: Tumour) -> Contains:
-    surface = tumour.surface
-    tree = SurfaceTree(surface.vertices, surface.triangles)
-    low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
-
-    def contains(points: FloatArray) -> NDArray[np.bool_]:
-        within: NDArray[np.bool_] = ((points > low) & (points < high)).all(axis=-1)
-        within[within] = tree.contains(points[within])
-        return within
-
-    return contains

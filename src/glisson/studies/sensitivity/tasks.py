@@ -9,18 +9,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from glisson.core.arrays import FloatArray
 from glisson.core.deformation import Deformation
 from glisson.core.mesh import TetMesh, TriangleSurface
 from glisson.core.model import Material, Model
 from glisson.core.structures import Tumour
-from glisson.geometry.distance import SurfaceTree
 from glisson.geometry.quadratic import boundary_surface
 from glisson.mechanics.quasi_static import QuasiStatic, QuasiStaticParameters
 from glisson.phantom.family import build_anatomy, scanned_structures
-from glisson.phantom.heterogeneity import Contains, stiffness_levels, uneven_moduli
+from glisson.phantom.heterogeneity import stiffness_levels, uneven_moduli
 from glisson.phantom.lever_lift import lever_lift
 from glisson.phantom.lift_truths import lift_truth
 from glisson.phantom.proportions import draw_proportions
@@ -30,6 +27,7 @@ from glisson.preoperative.model.regions import ORGAN, element_regions
 from glisson.studies.lifts import (
     LIFT_PACKAGES,
     carried_centroid,
+    inside,
     lift_model,
     outcome_of,
     rigidly_moved,
@@ -88,7 +86,7 @@ def solve_twin(inputs: Mapping[str, Any], folder: Path) -> Outcome:
     surface = boundary_surface(lift_truth(phantom).read().deformation.mesh)
     mesh, _ = mesh_of_size(surface, inputs["elements"])
     tumours = _tumours(phantom)
-    moduli = uneven_moduli(mesh, tissue.young_modulus_kpa, [_contains(tumour) for tumour in tumours])
+    moduli = uneven_moduli(mesh, tissue.young_modulus_kpa, [inside(tumour) for tumour in tumours])
     levels, means = stiffness_levels(moduli, _TWIN_LEVELS)
     model = Model(
         TetMesh(mesh.nodes, mesh.tetrahedra, levels),
@@ -137,16 +135,3 @@ def _truth_values(deformation: Deformation, tumour: Tumour) -> dict[str, Any]:
         "uncorrected_mm": float(np.linalg.norm(after - before)),
         "rigid_mm": float(np.linalg.norm(after - rigidly_moved(deformation, before))),
     }
-
-
-def _contains(tumour: Tumour) -> Contains:
-    surface = tumour.surface
-    tree = SurfaceTree(surface.vertices, surface.triangles)
-    low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
-
-    def contains(points: FloatArray) -> NDArray[np.bool_]:
-        within: NDArray[np.bool_] = ((points > low) & (points < high)).all(axis=-1)
-        within[within] = tree.contains(points[within])
-        return within
-
-    return contains
