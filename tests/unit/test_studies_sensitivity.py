@@ -21,7 +21,7 @@ from glisson.core.status import Status
 from glisson.core.structures import Tumour
 from glisson.preoperative.meshing.mmg import Mmg, MmgParameters
 from glisson.studies import meshing
-from glisson.studies.lifts import rigidly_moved
+from glisson.studies.lifts import inside, rigidly_moved
 from glisson.studies.point import Outcome
 from glisson.studies.sensitivity import tasks
 from glisson.studies.sensitivity.choices import LEVELS, SIZES, SOFT, STIFF, Choice, Tissue, all_together, one_at_a_time
@@ -153,7 +153,7 @@ def test_a_tumour_contains_what_lies_inside_it():
     import trimesh
 
     ball = trimesh.creation.icosphere(subdivisions=4, radius=10.0)
-    contains = tasks._contains(Tumour("t", TriangleSurface(ball.vertices, ball.faces)))
+    contains = inside(Tumour("t", TriangleSurface(ball.vertices, ball.faces)))
     points = np.random.default_rng(0).uniform(-12.0, 12.0, (40, 25, 3))
     radii = np.linalg.norm(points, axis=-1)
     clear = np.abs(radii - 10.0) > 0.1
