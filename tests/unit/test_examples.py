@@ -18,6 +18,11 @@ def test_the_hanging_column_grows_as_the_closed_form_says() -> None:
     assert grown == pytest.approx(known, rel=1e-3)
 
 
+def test_a_breath_is_followed_to_a_fraction_of_what_it_moves() -> None:
+    errors, still = runpy.run_path(str(ROOT / "examples/following_a_breath.py"))["main"]()
+    assert max(errors) < 0.2 * max(still)
+
+
 def test_two_materials_leaves_the_tetrahedra_and_solves_twice(
     meshed_small_case: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
