@@ -14,8 +14,6 @@ pytestmark = pytest.mark.real
 def test_the_first_frames_of_a_pulled_liver(shared_data: Path) -> None:
     """It moves by up to 35 mm under 1.8 to 1.9 N. Mestdagh and Cotin's own code is off by 6.3 % in the force."""
     folder = shared_data / "open" / "mestdagh-liver-sequences"
-    if not folder.is_dir():
-        pytest.skip(f"the sequences of the pulled liver are not in {folder}")
     row = measured(trials(quick=True)[0], folder, Unheard())
     assert (row["cases"], row["failed"], row["flagged"]) == (5, 0, 0)
     assert row["tre_mm"]["mean"] < 0.45

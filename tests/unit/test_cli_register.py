@@ -108,7 +108,6 @@ def test_frames_follow_one_another(case: Case, glisson: Glisson, tmp_path: Path)
 def test_forces_on_a_held_liver_are_found_or_told_why_not(case: Case, glisson: Glisson) -> None:
     """The liver of the small case as it was scanned: nothing pulls at it. In a room nothing is known to hold it."""
     model = read_model(case.path(MODEL))
-    assert model.mesh is not None
     nodes = model.mesh.nodes[np.unique(model.mesh.boundary()[0])]
     write_observations(case.path(OBSERVATIONS), Observations((Observation("surface", "swab", nodes, 0.5),)))
     code, said = glisson("register", case.folder, "--technique", "forces", "--loads", "4", "--reach-mm", "5")

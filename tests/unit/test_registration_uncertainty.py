@@ -80,7 +80,7 @@ def test_regions_hold_what_they_should_where_the_model_is_true() -> None:
         hessian = design.T @ design + prior
         solution = np.linalg.solve(hessian, design.T @ (design @ truth + rng.normal(size=rows)))
         state = MotionState(np.eye(3), np.zeros(3), solution[6:])
-        found = Fit(state, None, np.ones(0), hessian, np.zeros(0), 0.0)  # type: ignore[arg-type]  # no row is looked at
+        found = Fit(state, None, np.ones(0), hessian, np.zeros(0), 0.0)  # no row is looked at
         spread = posterior_spread(motion, found)
         off = motion.derivative(state, np.arange(40)) @ (solution - truth)
         covariance = spread @ spread.transpose(0, 2, 1)

@@ -72,8 +72,9 @@ def _text(made: RegisteredCase) -> str:
             for frame in values["frames"]
         ]
     for tumour in values["tumours"]:
+        x, y, z = tumour["after_mm"]
         told.append(
-            f"{tumour['name']:11} now at {place_text(tumour['after_mm'])} ({made.found.frame}), within "
+            f"{tumour['name']:11} now at {x:.1f}, {y:.1f}, {z:.1f} mm ({made.found.frame}), within "
             f"{tumour['radius95_mm']:.1f} mm by 95 %"
         )
     told.append(f"elsewhere   known to {values['sigma_mm']:.1f} mm (one standard deviation, median of the nodes)")

@@ -29,10 +29,10 @@ def misfits(seen: Seen, rows: Rows) -> tuple[str, ...]:
     count = len(seen.item)
     squares, gaps = rows.squares(count), np.zeros(count)
     np.add.at(gaps, rows.point, rows.gaps_mm**2)
-    told = []
+    told, rows_each = [], np.bincount(rows.point, minlength=count)
     for number, label in enumerate(seen.labels):
         mine = seen.item == number
-        expected = chi2.median(max(np.bincount(rows.point, minlength=count)[mine].min(), 1))
+        expected = chi2.median(rows_each[mine].min())
         if np.median(squares[mine]) > _DOUBTED**2 * expected:
             told.append(f"{label} by {np.sqrt(np.median(gaps[mine])):.0f} mm")
     return tuple(told)

@@ -87,24 +87,30 @@ class Following:
         """The organ, and whether it jumped."""
         if self._last is None:
             return self._prepared.register(remembered, None, progress), False
-        followed, failure = None, None
+        last = self._last.found
         try:
-            followed = self._prepared.register(remembered, self._last.found, progress)
-            if followed.set_aside < _SET_ASIDE and _apart(followed, self._last.found) < self._jump_mm:
-                return followed, False
-        except StageFailed as failed:
-            failure = failed
+            followed = self._prepared.register(remembered, last, progress)
+        except StageFailed as failure:
+            anew = self._anew(frame, progress)
+            if anew is None:
+                raise failure
+            return anew, _apart(anew, last) >= self._jump_mm
+        if followed.set_aside < _SET_ASIDE and _apart(followed, last) < self._jump_mm:
+            return followed, False
+        anew = self._anew(frame, progress)
+        if anew is None or not anew.status.is_good:
+            return followed, False
+        return anew, _apart(anew, last) >= self._jump_mm
+
+    def _anew(self, frame: Observations, progress: Progress) -> Registered | None:
+        """The organ looked for by what is new alone, as what was seen before a jump is of no more use.
+
+        None where that is too little to tell.
+        """
         try:
-            # Only what is new: what was seen before the jump is of no more use.
-            anew = self._prepared.register(frame, None, progress)
-        except (BadInput, StageFailed):  # too little of it to tell
-            anew = None
-        if anew is not None and (followed is None or anew.status.is_good):
-            return anew, _apart(anew, self._last.found) >= self._jump_mm
-        if followed is None:
-            assert failure is not None
-            raise failure
-        return followed, False
+            return self._prepared.register(frame, None, progress)
+        except (BadInput, StageFailed):
+            return None
 
     def _unseen(self, now_s: float) -> Followed:
         """The last place, or that of the scan, without any certainty."""

@@ -5,7 +5,7 @@ import numpy as np
 from glisson.core.arrays import FloatArray
 from glisson.core.deformation import Deformation
 from glisson.core.mesh import TriangleSurface
-from glisson.core.observations import Observation, Observations
+from glisson.core.observations import Observation, ObservationKind, Observations
 from glisson.core.structures import Curve, Structures
 from glisson.core.units import radians
 from glisson.geometry.mapping import PointMap
@@ -38,13 +38,13 @@ def observe(case: LeverCase, truth: Deformation, structures: Structures) -> Obse
     surface = boundary_surface(truth.mesh, truth.mesh.moved(truth.displacement))
     lever = lever_of(true_scenario(case))
     near = surface.vertices[gap_to_lever(surface.vertices, lever, radians(case.angle_deg)) < _TOUCHING_MM]
-    found = [
+    found: list[tuple[ObservationKind, str, FloatArray]] = [
         ("surface", "front", front(surface)),
         ("curve", "wire", _along_wire(truth, structures)),
         ("contact", lever.name, near[thinned(near, _TOUCHES_APART_MM)]),
     ]
     items = [
-        Observation(kind, name, points + random.normal(scale=NOISE_MM, size=points.shape), NOISE_MM)  # type: ignore[arg-type]  # the three above
+        Observation(kind, name, points + random.normal(scale=NOISE_MM, size=points.shape), NOISE_MM)
         for kind, name, points in found
     ]
     return Observations(tuple(items))
