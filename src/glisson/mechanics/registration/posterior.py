@@ -21,7 +21,7 @@ USUAL_MODES, USUAL_SHARE = 2.0, 0.1
 619 of the sparse-data twin; that counts as much as so many ways of deforming that were seen."""
 
 INFLATION = 1.17
-"""Standard deviations are multiplied by this, fitted on cases of livers 600 to 616 of the sparse-data twin, so that 90 %
+"""Standard deviations are multiplied by this, fitted on cases of livers 600 to 616 of the sparse-data twin so that 90 %
 regions hold 90 % of their targets; none of these livers is reported (docs/registration.md)."""
 
 _MOST_PATCHES = 60
