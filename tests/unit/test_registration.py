@@ -53,13 +53,15 @@ def test_derivatives_of_the_cost_are_those_of_differences(model: Model) -> None:
     state = motion.moved(motion.at_rest(), 0.8 * rng.normal(size=motion.size))
     full = FullFit(model, seen, 50.0)
     cut = np.full(len(seen.item), 9.0)
-    here, step = _at(motion, seen, state, cut), rng.normal(size=motion.size)
-    everywhere, push = full._at(motion.positions(state), cut), rng.normal(size=model.mesh.nodes.shape)
+    drawn = rng.normal(size=(1, 3))
+    here, step = _at(motion, seen, state, drawn, cut), rng.normal(size=motion.size + 3)
+    everywhere, push = full._at(motion.positions(state), drawn, cut), rng.normal(size=(len(model.mesh.nodes) + 1, 3))
     slopes = float(here.gradient @ step), float((full._gradient(everywhere) * push).sum())
     errors = []
     for size in (2e-3, 1e-3):
-        reduced = _at(motion, seen, motion.moved(state, size * step), cut).cost - here.cost
-        whole = full._at(everywhere.positions + size * push, cut).cost - everywhere.cost
+        moved, shifts = motion.moved(state, size * step[:-3]), drawn + size * step[-3:]
+        reduced = _at(motion, seen, moved, shifts, cut).cost - here.cost
+        whole = full._at(everywhere.positions + size * push[:-1], drawn + size * push[-1], cut).cost - everywhere.cost
         errors.append([abs(reduced - size * slopes[0]), abs(whole - size * slopes[1])])
     orders = np.log2(np.array(errors[0]) / errors[1])
     assert orders == pytest.approx([2.0, 2.0], abs=0.15)

@@ -103,13 +103,14 @@ def test_derivatives_of_the_joint_cost_are_those_of_differences(truth: Deformati
     motion = ScenarioMotion(unknowns, tangent, modes.basis, modes.energies_uj, seen.items[1:])
     held = Seen(Places(model), seen, ModelError(0.5, 20.0))
     state, cut = motion.state(0.1 * rng.normal(size=motion.size)), np.full(len(held.item), 4.0)
-    here = _at(motion, held, state, cut)
+    drawn = rng.normal(size=(held.curves, 3))
+    here = _at(motion, held, state, drawn, cut)
     direction = rng.normal(size=motion.size)
     steps = np.array([1e-3, 5e-4])
     left = [
-        _at(motion, held, motion.moved(state, step * direction), cut).cost
+        _at(motion, held, motion.moved(state, step * direction), drawn, cut).cost
         - here.cost
-        - step * here.gradient @ direction
+        - step * here.gradient[: motion.size] @ direction
         for step in steps
     ]
     assert np.log(left[0] / left[1]) / np.log(2.0) == pytest.approx(2.0, abs=0.1)

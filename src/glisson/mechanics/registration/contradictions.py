@@ -3,10 +3,13 @@
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from glisson.core.arrays import FloatArray
 from glisson.core.errors import StageFailed
 from glisson.core.observations import Observations
+from glisson.mechanics.registration.drawing import DRAWN_MM
 from glisson.mechanics.registration.rows import Rows
 from glisson.mechanics.registration.seen import Seen
 
@@ -19,12 +22,13 @@ _MOST_LEFT_OUT = 8
 _MOST_TOLD = 4
 
 
-def misfits(seen: Seen, rows: Rows) -> tuple[str, ...]:
+def misfits(seen: Seen, rows: Rows, shifts_mm: FloatArray) -> tuple[str, ...]:
     """What does not fit where the organ has come to rest, each with how far it is off.
 
     Args:
         seen: all that was seen.
         rows: of it, there.
+        shifts_mm: (q, 3) of the curves that were drawn.
     """
     count = len(seen.item)
     squares, gaps = rows.squares(count), np.zeros(count)
@@ -33,9 +37,16 @@ def misfits(seen: Seen, rows: Rows) -> tuple[str, ...]:
     for number, label in enumerate(seen.labels):
         mine = seen.item == number
         expected = chi2.median(rows_each[mine].min())
-        if np.median(squares[mine]) > _DOUBTED**2 * expected:
-            told.append(f"{label} by {np.sqrt(np.median(gaps[mine])):.0f} mm")
+        drawn = _drawn_off(rows, mine, shifts_mm)
+        if np.median(squares[mine]) > _DOUBTED**2 * expected or drawn > _DOUBTED * DRAWN_MM * np.sqrt(chi2.median(3)):
+            told.append(f"{label} by {np.hypot(np.sqrt(np.median(gaps[mine])), drawn):.0f} mm")
     return tuple(told)
+
+
+def _drawn_off(rows: Rows, mine: NDArray[np.bool_], shifts_mm: FloatArray) -> float:
+    """How far the curve (mm) was shifted on which some points (p,) lie; 0 where they lie on none."""
+    curve = int(rows.curve[mine[rows.point]][0])
+    return float(np.linalg.norm(shifts_mm[curve])) if curve >= 0 else 0.0
 
 
 def contradiction(observations: Observations, off: tuple[str, ...], fits: Callable[[Observations], bool]) -> str | None:

@@ -8,6 +8,7 @@ from scipy.linalg import cho_factor, cho_solve
 from glisson.core.arrays import FloatArray
 from glisson.core.errors import StageFailed
 from glisson.core.status import Status
+from glisson.mechanics.registration.drawing import marginal, shift_cost, with_shift_prior, with_shifts
 from glisson.mechanics.registration.outliers import cuts, judged
 from glisson.mechanics.registration.pulled_body import Pulled, PulledBody
 from glisson.mechanics.registration.rows import Rows
@@ -22,9 +23,13 @@ _LEAST = 1e-3  # variance of a way to move, as a share of the largest one's
 
 @dataclass(frozen=True, eq=False)
 class ForceFit:
-    """A state at rest, what was seen there, the Hessian (3 b, 3 b) of the cost, and beliefs (p,) in the points."""
+    """A state at rest, what was seen there, the Hessian (3 b, 3 b) of the cost, and beliefs (p,) in the points.
+
+    `shifts_mm` (q, 3) are those of the curves that were drawn.
+    """
 
     state: Pulled
+    shifts_mm: FloatArray
     rows: Rows
     hessian: FloatArray
     beliefs: FloatArray
@@ -33,10 +38,11 @@ class ForceFit:
 @dataclass(frozen=True, eq=False)
 class _Place:
     state: Pulled
+    shifts_mm: FloatArray
     rows: Rows
 
     def cost(self, cut: FloatArray) -> float:
-        return judged(self.rows, cut).cost + 0.5 * float((self.state.amounts**2).sum())
+        return judged(self.rows, cut).cost + 0.5 * float((self.state.amounts**2).sum()) + shift_cost(self.shifts_mm)
 
 
 def fit_forces(body: PulledBody, seen: Seen, start: Pulled) -> ForceFit:
@@ -47,20 +53,20 @@ def fit_forces(body: PulledBody, seen: Seen, start: Pulled) -> ForceFit:
     Raises:
         StageFailed: the organ does not come to rest.
     """
-    here = _seen(body, seen, start)
+    here = _seen(body, seen, start, seen.as_drawn)
     for _ in range(_ITERATIONS):
         cut = cuts(here.rows, seen.item)
         judgement = judged(here.rows, cut)
         follows = body.follows(here.state)
-        jacobian = _in_modes(body, here.rows) @ follows
+        jacobian = with_shifts(_in_modes(body, here.rows) @ follows, here.rows, seen.curves)
         weighted = jacobian * judgement.weights[:, None]
-        hessian = weighted.T @ jacobian + np.eye(body.count)
-        gradient = weighted.T @ here.rows.residuals - here.state.amounts.ravel()
-        step = cho_solve(cho_factor(hessian), gradient)
-        longest = float(np.linalg.norm(body.basis[body.patch] @ (follows @ step), axis=1).max())
+        pull, prior = with_shift_prior(here.state.amounts.ravel(), np.eye(body.count), here.shifts_mm)
+        hessian = weighted.T @ jacobian + prior
+        step = cho_solve(cho_factor(hessian), weighted.T @ here.rows.residuals - pull)
+        longest = float(np.linalg.norm(body.basis[body.patch] @ (follows @ step[: body.count]), axis=1).max())
         there = _lower(body, seen, here, min(1.0, _LONGEST_MM / longest) * step, cut) if longest > _STILL_MM else None
         if there is None:
-            return ForceFit(here.state, here.rows, hessian, judgement.beliefs)
+            return ForceFit(here.state, here.shifts_mm, here.rows, marginal(hessian, body.count), judgement.beliefs)
         here = there
     raise StageFailed("The organ does not come to rest on what was seen.", Status.ITERATION_LIMIT)
 
@@ -83,8 +89,8 @@ def _in_modes(body: PulledBody, rows: Rows) -> FloatArray:
     return result
 
 
-def _seen(body: PulledBody, seen: Seen, state: Pulled) -> _Place:
-    return _Place(state, seen.rows(body.positions(state)))
+def _seen(body: PulledBody, seen: Seen, state: Pulled, shifts_mm: FloatArray) -> _Place:
+    return _Place(state, shifts_mm, seen.rows(body.positions(state), shifts_mm))
 
 
 def _lower(body: PulledBody, seen: Seen, here: _Place, step: FloatArray, cut: FloatArray) -> _Place | None:
@@ -92,7 +98,8 @@ def _lower(body: PulledBody, seen: Seen, here: _Place, step: FloatArray, cut: Fl
     cost = here.cost(cut)
     for _ in range(_HALVINGS):
         try:
-            there = _seen(body, seen, body.moved(here.state, step))
+            state, shifts = step[: body.count], step[body.count :].reshape(-1, 3)
+            there = _seen(body, seen, body.moved(here.state, state), here.shifts_mm + shifts)
             if there.cost(cut) < cost:
                 return there
         except StageFailed:

@@ -105,4 +105,4 @@ class PreparedForces:
         """The forces fitted, and what does not fit."""
         seen = Seen(self._places, observations, self._error)
         found = fit_forces(self._body, seen, start)
-        return found, misfits(seen, found.rows)
+        return found, misfits(seen, found.rows, found.shifts_mm)

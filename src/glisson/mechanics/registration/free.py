@@ -51,6 +51,7 @@ class FreeBody:
         full = FullFit(self.model, seen, self.energy_uj)
         try:
             found = full.fit(start)
-            return Deformed(found.positions, full.posterior_spread(found, self.modes), found.beliefs)
+            spread = full.posterior_spread(found, self.modes)
+            return Deformed(found.positions, spread, found.rows, found.shifts_mm, found.beliefs)
         finally:
             full.close()

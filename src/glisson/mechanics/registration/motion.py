@@ -72,17 +72,23 @@ class BasisMotion:
 
     def positions(self, state: MotionState) -> FloatArray:
         """See `Motion`."""
-        shape = self.nodes - self.middle_mm + self.basis @ state.amounts
-        return shape @ state.rotation.T + self.middle_mm + state.shift_mm
+        return (self.shape(state.amounts) - self.middle_mm) @ state.rotation.T + self.middle_mm + state.shift_mm
+
+    def shape(self, amounts: FloatArray) -> FloatArray:
+        """Nodes (n, 3) of the organ that has deformed but not moved."""
+        return self.nodes + self.basis @ amounts
+
+    def slopes(self, amounts: FloatArray, nodes: IntArray) -> FloatArray:
+        """Derivative (m, 3, k) of that at some nodes (m,)."""
+        return self.basis[nodes]
 
     def derivative(self, state: MotionState, nodes: IntArray) -> FloatArray:
         """See `Motion`."""
-        basis = self.basis[nodes]
-        arms = (self.nodes[nodes] - self.middle_mm + basis @ state.amounts) @ state.rotation.T
+        arms = (self.shape(state.amounts)[nodes] - self.middle_mm) @ state.rotation.T
         result = np.zeros((len(nodes), 3, self.size))
         result[:, :, :3] = np.cross(np.eye(3)[None], arms[:, None, :]).transpose(0, 2, 1) / self.radius_mm
         result[:, :, 3:6] = np.eye(3)
-        result[:, :, 6:] = state.rotation @ basis
+        result[:, :, 6:] = state.rotation @ self.slopes(state.amounts, nodes)
         return result
 
     def prior(self, state: MotionState) -> tuple[float, FloatArray, FloatArray]:

@@ -6,6 +6,7 @@ from typing import Protocol
 import numpy as np
 
 from glisson.core.arrays import FloatArray
+from glisson.core.errors import StageFailed
 from glisson.core.model import Model
 from glisson.core.observations import Observations
 from glisson.core.protocols import Progress, silent
@@ -18,15 +19,29 @@ from glisson.mechanics.registration.outcome import outcome
 from glisson.mechanics.registration.places import Places
 from glisson.mechanics.registration.placing import placed
 from glisson.mechanics.registration.posterior import INFLATION, model_error_spread, posterior_spread
+from glisson.mechanics.registration.rows import Rows
 from glisson.mechanics.registration.seen import ModelError, Seen
+
+_NEAR_MM = 5.0
+"""Root mean square motion since the last answer within which that was a start to go on from."""
 
 
 @dataclass(frozen=True, eq=False)
 class Deformed:
-    """Nodes (n, 3) now, their posterior spread (n, 3, k), and how far each observed point is believed (p,)."""
+    """A body at rest on what was seen.
+
+    Args:
+        positions: nodes (n, 3) now.
+        spread_mm: their posterior spread (n, 3, k).
+        rows: what was seen, there.
+        shifts_mm: (q, 3) of the curves that were drawn.
+        beliefs: (p,) how far each observed point is believed.
+    """
 
     positions: FloatArray
     spread_mm: FloatArray
+    rows: Rows
+    shifts_mm: FloatArray
     beliefs: FloatArray
 
 
@@ -50,29 +65,40 @@ class Prepared:
     ) -> Registered:
         """See `PreparedRegistration`."""
         check_observations(self._model, observations)
-        ambiguous = None
-        if last is None:
-            progress(0.0, "placing the organ")
-            place = placed(self._places, observations)
-            start, ambiguous = place.positions, place.ambiguous
-        else:
+        if last is not None:
             check_last(self._model, observations, last)
-            start = last.positions_mm
-        progress(0.4, "deforming the organ")
-        found, off = self._fitted(observations, start)
+        seen = Seen(self._places, observations, self._error)
+        near = None if last is None else self._near(seen, last.positions_mm, progress)
+        found, ambiguous = self._anywhere(seen, observations, progress) if near is None else (near, None)
+        off = misfits(seen, found.rows, found.shifts_mm)
         doubt = contradiction(observations, off, self._fits) or ambiguous
         spread = INFLATION * np.concatenate([found.spread_mm, self._misfit_mm], axis=2)
         return outcome(self._model, observations.frame, found.positions, spread, found.beliefs, doubt)
 
-    def _fitted(self, observations: Observations, start: FloatArray) -> tuple[Deformed, tuple[str, ...]]:
-        """The body fitted, and what does not fit."""
-        seen = Seen(self._places, observations, self._error)
-        found = self._body.fitted(seen, start)
-        return found, misfits(seen, seen.rows(found.positions))
+    def _near(self, seen: Seen, last: FloatArray, progress: Progress) -> Deformed | None:
+        """The body next to nodes (n, 3) where it was; None where it is not there any more.
+
+        From far away the way to what is nearest ends anywhere, so that it says nothing of where the organ is.
+        """
+        progress(0.4, "deforming the organ")
+        try:
+            found = self._body.fitted(seen, last)
+        except StageFailed:
+            return None
+        moved = np.sqrt(((found.positions - last) ** 2).sum(axis=1).mean())
+        return found if moved < _NEAR_MM else None
+
+    def _anywhere(self, seen: Seen, observations: Observations, progress: Progress) -> tuple[Deformed, str | None]:
+        """The body wherever it is, and a sentence where it may as well be elsewhere."""
+        progress(0.0, "placing the organ")
+        place = placed(self._places, observations)
+        progress(0.4, "deforming the organ")
+        return self._body.fitted(seen, place.positions), place.ambiguous
 
     def _fits(self, observations: Observations) -> bool:
-        _, off = self._fitted(observations, placed(self._places, observations).positions)
-        return not off
+        seen = Seen(self._places, observations, self._error)
+        found, _ = self._anywhere(seen, observations, silent)
+        return not misfits(seen, found.rows, found.shifts_mm)
 
 
 class MovedBody:
@@ -85,4 +111,5 @@ class MovedBody:
         """See `Deformable`."""
         motion = self._motion
         found = fit(motion, seen, motion.nearest(start))
-        return Deformed(motion.positions(found.state), posterior_spread(motion, found), found.beliefs)
+        spread = posterior_spread(motion, found)
+        return Deformed(motion.positions(found.state), spread, found.rows, found.shifts_mm, found.beliefs)

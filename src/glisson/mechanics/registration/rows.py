@@ -22,6 +22,7 @@ class Rows:
         point: (r,) number of the observed point that the row belongs to; its rows count or are set aside together.
         worth: (r,) how much the point counts beside others that are off together with it, 0 to 1.
         robust: (r,) whether the point may be an outlier.
+        curve: (r,) number of the drawn curve that the point lies on, −1 for none.
     """
 
     nodes: IntArray
@@ -32,6 +33,7 @@ class Rows:
     point: IntArray
     worth: FloatArray
     robust: NDArray[np.bool_]
+    curve: IntArray
 
     def some(self, chosen: IntArray) -> "Rows":
         """The rows of some numbers."""
@@ -62,6 +64,7 @@ def joined(parts: Sequence[Rows]) -> Rows:
         point=np.concatenate([part.point for part in parts]),
         worth=np.concatenate([part.worth for part in parts]),
         robust=np.concatenate([part.robust for part in parts]),
+        curve=np.concatenate([part.curve for part in parts]),
     )
 
 

@@ -15,9 +15,6 @@ from glisson.mechanics.registration.rows import Rows, joined
 _TOUCHING_MM = 1e-6
 _ON_EDGE = 1e-9
 
-DRAWN_MM = 1.5
-"""A curve of the model, drawn by hand in the scan, is off by so much in each coordinate, all of it alike."""
-
 
 @dataclass(frozen=True)
 class ModelError:
@@ -43,11 +40,11 @@ class PointErrors:
 class Match(Protocol):
     """One observation, held against the model."""
 
-    groups: IntArray
-    """Nodes (k, a) that its rows may have in common, beside those of one element."""
+    def groups(self, first_shift: int) -> IntArray:
+        """Nodes (k, a) that its rows may have in common; see `Seen.groups`."""
 
-    def rows(self, positions: FloatArray, first: int) -> Rows:
-        """Its rows, with the nodes at `positions` (n, 3); its points are numbered from `first`."""
+    def rows(self, positions: FloatArray, shifts_mm: FloatArray, first: int) -> Rows:
+        """Its rows, with nodes and curves as in `Seen.rows`; its points are numbered from `first`."""
 
 
 class Seen:
@@ -61,14 +58,17 @@ class Seen:
 
     def __init__(self, places: Places, observations: Observations, model_error: ModelError) -> None:
         self._matches: list[Match] = []
-        counts = []
+        counts: list[int] = []
+        self.curves = 0
+        """How many of the observations are curves."""
         for item in (item for item in observations.items if len(item.points_mm)):
             counts.append(len(item.points_mm))
             errors = _errors(item, model_error)
             if item.kind == "landmark":
                 self._matches.append(PointMatch(item.points_mm, errors, places.landmark(item.name)))
             elif item.kind == "curve":
-                self._matches.append(CurveMatch(item.points_mm, errors, places.curve(item.name)))
+                self._matches.append(CurveMatch(item.points_mm, errors, places.curve(item.name), self.curves))
+                self.curves += 1
             else:
                 self._matches.append(SurfaceMatch(item.points_mm, errors, places.tree(item.name)))
         self.labels = [f"{item.kind} {item.name!r}" for item in observations.items if len(item.points_mm)]
@@ -77,15 +77,20 @@ class Seen:
         self.item = np.repeat(np.arange(len(counts)), counts)
         """The number of the observation (p,) that each observed point belongs to."""
 
-    @property
-    def groups(self) -> list[IntArray]:
-        """Nodes (k, a) that rows may have in common, beside those of one element."""
-        return [match.groups for match in self._matches if len(match.groups)]
+    def groups(self, first_shift: int) -> list[IntArray]:
+        """Nodes (k, a) that rows may have in common, beside those of one element; shifts are nodes from a number on."""
+        found = [match.groups(first_shift) for match in self._matches]
+        return [nodes for nodes in found if len(nodes)]
 
-    def rows(self, positions: FloatArray) -> Rows:
-        """All rows, with the nodes at `positions` (n, 3)."""
+    @property
+    def as_drawn(self) -> FloatArray:
+        """Shifts (q, 3) of the curves that are none."""
+        return np.zeros((self.curves, 3))
+
+    def rows(self, positions: FloatArray, shifts_mm: FloatArray) -> Rows:
+        """All rows, with the nodes at `positions` (n, 3) and the curves as far from where they were drawn."""
         parts = zip(self._matches, self._firsts, strict=True)
-        return joined([match.rows(positions, first) for match, first in parts])
+        return joined([match.rows(positions, shifts_mm, first) for match, first in parts])
 
 
 class SurfaceMatch:
@@ -93,9 +98,12 @@ class SurfaceMatch:
 
     def __init__(self, points_mm: FloatArray, errors: PointErrors, tree: SurfaceTree) -> None:
         self._points, self._errors, self._tree = points_mm, errors, tree
-        self.groups = np.zeros((0, 1), dtype=np.int64)
 
-    def rows(self, positions: FloatArray, first: int) -> Rows:
+    def groups(self, first_shift: int) -> IntArray:
+        """See `Match`."""
+        return np.zeros((0, 1), dtype=np.int64)
+
+    def rows(self, positions: FloatArray, shifts_mm: FloatArray, first: int) -> Rows:
         """See `Match`."""
         nearest = self._tree.moved(positions).nearest(self._points)
         nodes = self._tree.triangles[nearest.triangles]
@@ -131,11 +139,14 @@ class PointMatch:
 
     def __init__(self, points_mm: FloatArray, errors: PointErrors, place: MaterialPoints) -> None:
         self._points, self._place, self._worth = points_mm, place, errors.worth
-        self.groups = place.nodes
         values, self._axes = np.linalg.eigh(errors.covariance_mm2)
         self._sigma = np.sqrt(values)
 
-    def rows(self, positions: FloatArray, first: int) -> Rows:
+    def groups(self, first_shift: int) -> IntArray:
+        """See `Match`."""
+        return self._place.nodes
+
+    def rows(self, positions: FloatArray, shifts_mm: FloatArray, first: int) -> Rows:
         """See `Match`: three rows for each, along the axes of its ellipsoid."""
         count = len(self._points)
         gaps = np.einsum("pia,pi->pa", self._axes, self._points - self._place.at(positions))
@@ -148,19 +159,25 @@ class PointMatch:
             point=first + np.repeat(np.arange(count), 3),
             worth=np.repeat(self._worth, 3),
             robust=np.zeros(3 * count, dtype=np.bool_),
+            curve=np.full(3 * count, -1),
         )
 
 
 class CurveMatch:
     """Points along a curve in the tissue, which may slide: each pulls at the nearest point of it."""
 
-    def __init__(self, points_mm: FloatArray, errors: PointErrors, curve: MaterialCurve) -> None:
-        self._points, self._errors, self._curve = points_mm, errors, curve
-        self.groups = curve.points.nodes[curve.segments].reshape(len(curve.segments), -1)
+    def __init__(self, points_mm: FloatArray, errors: PointErrors, curve: MaterialCurve, number: int) -> None:
+        self._points, self._errors, self._curve, self._number = points_mm, errors, curve, number
 
-    def rows(self, positions: FloatArray, first: int) -> Rows:
+    def groups(self, first_shift: int) -> IntArray:
+        """See `Match`."""
+        segments = self._curve.segments
+        nodes = self._curve.points.nodes[segments].reshape(len(segments), -1)
+        return np.concatenate([nodes, np.full((len(nodes), 1), first_shift + self._number)], axis=1)
+
+    def rows(self, positions: FloatArray, shifts_mm: FloatArray, first: int) -> Rows:
         """See `Match`: two rows for each, across the curve; beyond its ends the nearest end."""
-        places = self._curve.points.at(positions)
+        places = self._curve.points.at(positions) + shifts_mm[self._number]
         begin, end = (places[self._curve.segments[:, side]] for side in (0, 1))
         along = end - begin
         squared = np.maximum((along**2).sum(axis=1), 1e-12)
@@ -184,7 +201,8 @@ class CurveMatch:
             _along(axis, np.einsum("pi,pi->p", arms, axis), self._errors, nodes, weights, first, True)
             for axis in (first_across, second_across)
         ]
-        return joined(parts)
+        rows = joined(parts)
+        return replace(rows, curve=np.full(len(rows.gaps_mm), self._number))
 
 
 def _along(
@@ -194,7 +212,7 @@ def _along(
     """One row for each point, along its direction."""
     sigma = np.sqrt(np.einsum("pi,pij,pj->p", directions, errors.covariance_mm2, directions))
     numbers, may_lie = first + np.arange(len(gaps)), np.full(len(gaps), robust)
-    return Rows(nodes, weights, directions, gaps, sigma, numbers, errors.worth, may_lie)
+    return Rows(nodes, weights, directions, gaps, sigma, numbers, errors.worth, may_lie, np.full(len(gaps), -1))
 
 
 def _across(along: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -217,7 +235,6 @@ def _errors(item: Observation, model: ModelError) -> PointErrors:
         own = np.tile(item.sigma_mm**2 * np.eye(3), (count, 1, 1))
     near = KDTree(item.points_mm).query_ball_point(item.points_mm, model.length_mm, return_length=True)
     variance, shared = np.trace(own, axis1=1, axis2=2) / 3.0, model.sigma_mm**2
-    drawn = DRAWN_MM**2 if item.kind == "curve" else 0.0
     # Points that are off together by the same error tell no more than one of them does.
-    worth = (variance + shared + drawn) / (variance + near * shared + count * drawn)
-    return PointErrors(own + (shared + drawn) * np.eye(3), worth)
+    worth = (variance + shared) / (variance + near * shared)
+    return PointErrors(own + shared * np.eye(3), worth)
