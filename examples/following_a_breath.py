@@ -44,7 +44,7 @@ def main() -> tuple[list[float], list[float]]:
     model = Model(mesh, {0: Material("neo-hookean", 5.0, 0.45)}, {0: "tissue"}, {})
     surface = np.unique(mesh.boundary()[0])
     seen = surface[mesh.nodes[surface, 2] > -5.0]
-    prepared = make_technique("registration", "linear-basis", {}, "the example").prepare(model)
+    prepared = make_technique("registration", "tractions", {}, "the example").prepare(model)
     following = Following(model, prepared, drift_mm_per_s=10.0)
     random, errors, still = np.random.default_rng(0), [], []
     for number, share in enumerate(np.sin(np.linspace(0.1, 3.0, 6))):

@@ -83,7 +83,7 @@ def test_a_refused_frame_leaves_the_sequence_as_it_was(model: Model) -> None:
     assert off(model, following.next(Observations((swab(model, 1.0),))), 1.0) < 1.0
 
 
-@pytest.mark.parametrize("technique", ["rigid", "linear-basis"])
+@pytest.mark.parametrize("technique", ["rigid", "tractions"])
 def test_tools_that_contradict_each_other_are_named(model: Model, technique: str) -> None:
     rng = np.random.default_rng(4)
     surface = seen_surface(model, model.mesh.nodes, rng, 0.5)

@@ -82,7 +82,7 @@ def test_regions_hold_what_they_should_where_the_model_is_true() -> None:
         solution = np.linalg.solve(hessian, design.T @ (design @ truth + rng.normal(size=rows)))
         state = MotionState(np.eye(3), np.zeros(3), solution[6:])
         found = Fit(state, np.zeros((0, 3)), None, np.ones(0), hessian, np.zeros(0), 0.0)  # no row is looked at
-        spread = posterior_spread(motion, found)
+        spread = posterior_spread(motion, found, 1.0)
         off = motion.derivative(state, np.arange(40)) @ (solution - truth)
         covariance = spread @ spread.transpose(0, 2, 1)
         squares.append(np.einsum("ni,nij,nj->n", off, np.linalg.inv(covariance), off))

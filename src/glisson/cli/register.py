@@ -11,7 +11,7 @@ from glisson.cli.progress import StageLines
 from glisson.core.registry import list_techniques, technique_class
 from glisson.core.units import place_text
 from glisson.framework.case import open_case
-from glisson.framework.registering import LINEAR_BASIS, RegisteredCase, register_case
+from glisson.framework.registering import DEFAULT, RegisteredCase, register_case
 
 _KEYS = (
     "status", "message", "technique", "frame", "unobserved", "set_aside", "sigma_mm", "tumours",
@@ -30,7 +30,7 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
         "case's own",
     )
     parser.add_argument(
-        "--technique", metavar="NAME", default=LINEAR_BASIS, help=f"see glisson techniques; by default {LINEAR_BASIS}"
+        "--technique", metavar="NAME", default=DEFAULT, help=f"see glisson techniques; by default {DEFAULT}"
     )
     for name, words in _explained().items():
         parser.add_argument(f"--{name.replace('_', '-')}", dest=name, metavar="VALUE", help=words)
@@ -94,7 +94,7 @@ COMMAND = Command(
     "  glisson register liver\n"
     "  glisson register liver --observations swab.json --technique free\n"
     "  glisson register liver --observations frame-1.json frame-2.json frame-3.json\n"
-    "  glisson register liver --strain 0.05 --json",
+    "  glisson register liver --motion-mm 5 --json",
     _add_arguments,
     _run,
     _KEYS,

@@ -27,7 +27,7 @@ from glisson.io.scenario_files import read_scenario
 from glisson.mechanics.registration.following import Followed, Following
 from glisson.mechanics.registration.next_touch import touches, viewer
 
-LINEAR_BASIS = "linear-basis"
+DEFAULT = "tractions"
 REGISTERED = f"{RESULTS}/registered"
 _ANSWER = "registration.json"
 
@@ -44,7 +44,7 @@ class RegisteredCase:
 def register_case(
     case: Case,
     observations: Sequence[str | Path] = (),
-    technique: str = LINEAR_BASIS,
+    technique: str = DEFAULT,
     parameters: Mapping[str, Any] | None = None,
     progress: Progress = silent,
 ) -> RegisteredCase:

@@ -16,13 +16,13 @@ from glisson.mechanics.registration.seen import ModelError
 _LEAST_PRECISION = 1e-6
 """Per mm²: what nothing determines has a standard deviation of a metre."""
 
-USUAL_MODES, USUAL_SHARE = 2.0, 0.1
-"""Before anything is seen, the strain energy is expected to be that share of what `strain` allows, as in livers 600 to
-619 of the sparse-data twin; that counts as much as so many ways of deforming that were seen."""
+_USUAL_MODES = 2.0
+"""What is expected of the organ's deformation before anything is seen counts as much as so many ways of deforming that
+were seen."""
 
-INFLATION = 1.17
-"""Standard deviations are multiplied by this, fitted on cases of livers 600 to 616 of the sparse-data twin so that 90 %
-regions hold 90 % of their targets; none of these livers is reported (docs/registration.md)."""
+INFLATION = 1.28
+"""Standard deviations are multiplied by this, fitted with `tractions` on cases of livers 600 to 619 of the sparse-data
+twin so that 90 % regions hold 90 % of their targets; none of these livers is reported (docs/registration.md)."""
 
 _MOST_PATCHES = 60
 
@@ -36,17 +36,22 @@ def spread_by(hessian: FloatArray, motion: Motion, found: Fit) -> FloatArray:
     return spread
 
 
-def posterior_spread(motion: Motion, found: Fit) -> FloatArray:
-    """The same of an organ that moves rigidly and deforms at the cost of strain energy.
+def posterior_spread(motion: Motion, found: Fit, usual: float) -> FloatArray:
+    """The same of an organ that moves rigidly and deforms at a cost.
 
     The covariance is the inverse of the Gauss–Newton Hessian, in which the prior is as wide as the organ's own
-    deformation says: the energy in the ways of deforming that were seen tells that in the others (empirical Bayes;
+    deformation says: the cost of the ways of deforming that were seen tells that of the others (empirical Bayes;
     MacKay 1992, Neural Computation 4:415). An organ that hardly deforms where it is seen hardly does so elsewhere.
+
+    Args:
+        motion: the ways to move.
+        found: where it came to rest.
+        usual: the share of what the motion's prior allows that is expected before anything is seen.
     """
     cost, _, prior = motion.prior(found.state)
     held = found.hessian + _LEAST_PRECISION * np.eye(motion.size)
     seen = motion.size - 6 - float(np.trace(np.linalg.solve(held, prior)))
-    share = (USUAL_MODES * USUAL_SHARE + 2.0 * cost) / (USUAL_MODES + seen)
+    share = (_USUAL_MODES * usual + 2.0 * cost) / (_USUAL_MODES + seen)
     return spread_by(found.hessian + (1.0 / share - 1.0) * prior, motion, found)
 
 

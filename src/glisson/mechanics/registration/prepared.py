@@ -102,14 +102,19 @@ class Prepared:
 
 
 class MovedBody:
-    """A body that moves by a basis."""
+    """A body that moves by a basis.
 
-    def __init__(self, motion: BasisMotion) -> None:
-        self._motion = motion
+    Args:
+        motion: its ways to move.
+        usual: see `posterior_spread`.
+    """
+
+    def __init__(self, motion: BasisMotion, usual: float = 1.0) -> None:
+        self._motion, self._usual = motion, usual
 
     def fitted(self, seen: Seen, start: FloatArray) -> Deformed:
         """See `Deformable`."""
         motion = self._motion
         found = fit(motion, seen, motion.nearest(start))
-        spread = posterior_spread(motion, found)
+        spread = posterior_spread(motion, found, self._usual)
         return Deformed(motion.positions(found.state), spread, found.rows, found.shifts_mm, found.beliefs)

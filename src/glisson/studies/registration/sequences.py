@@ -48,7 +48,7 @@ def trials(quick: bool) -> list[Trial]:
         *(Trial("forces", sequence, parameters=_FORCES) for sequence in neo),
         Trial("forces", "linear-s1", LINEAR, parameters=_FORCES),
         *(Trial("forces", sequence, LINEAR, parameters=_FORCES) for sequence in neo),
-        Trial("linear-basis", "neohookean-s3"),
+        Trial("tractions", "neohookean-s3"),
         Trial("forces", "neohookean-s3", quadratic=True, parameters=_FORCES | {"loads": _FEW_LOADS}),
     ]
 

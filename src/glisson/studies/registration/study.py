@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 from glisson.core.errors import StageFailed
 from glisson.core.registry import list_techniques
 from glisson.core.status import Status
+from glisson.framework.registering import DEFAULT
 from glisson.mechanics.registration.forces import Forces
 from glisson.mechanics.registration.scenario import AdjustedScenario
 from glisson.navigation.figures.picture import Picture
@@ -18,10 +19,14 @@ from glisson.studies.registration.figures import PICTURE
 from glisson.studies.registration.rows import flat, scores, table_rows, totals
 from glisson.studies.registration.scoring import HARDNESS, SCORE
 from glisson.studies.registration.solving_model import model_point
+from glisson.studies.registration.starts import STARTS, starts
 from glisson.studies.registration.telling import as_lines, as_page
 from glisson.studies.registration.truths import truth_point
 from glisson.studies.study import Conclusion
 from glisson.studies.tables import as_csv
+
+_STARTED = 4
+"""One case in so many is begun from bad starts, too."""
 
 QUICK = {"livers": 1, "packings": 1, "views": 4, "bends": 2}
 
@@ -57,19 +62,22 @@ class SparseDataTwin:
             if not made.is_good:
                 status = made.status or Status.STAGNATED
                 raise StageFailed(f"A liver of the twin could not be made: {made.message}", status)
-        return [*self._shown, *(point for case in self.design.cases() for point in self._of_case(case))]
+        scored = [point for case in self.design.cases() for point in self._of_case(case)]
+        return [*self._shown, *scored, *self._started]
 
     def conclude(self, prepared: Mapping[str, Outcome], done: Mapping[str, Outcome]) -> Conclusion:
         """Rows for machines, and the table as the challenge prints it."""
-        points = [point for point in self.points(prepared) if point.task != PICTURE]
+        points = [point for point in self.points(prepared) if point.task not in (PICTURE, STARTS)]
+        begun = [done[point.key].values.get("apart_mm") for point in self._started if point.key in done]
         found = scores((point, done[point.key]) for point in points if point.key in done)
         values: dict[str, Any] = {
             "rows": table_rows(found),
             "totals": totals(found),
+            "starts": starts([apart for apart in begun if apart is not None]),
             "cases": len(self.design.cases()),
             "redrawn": sum(prepared[point.key].values["redrawn"] for point in self._truths.values()),
             "failed": [f"{s.technique}, case {s.case.number}: {s.message}" for s in found if not s.errors_mm],
-            "unfinished": sum(point.key not in done for point in points),
+            "unfinished": sum(point.key not in done for point in [*points, *self._started]),
         }
         shown = [done[point.key] for point in self._shown if point.key in done]
         pictures = [Picture(**outcome.values) for outcome in shown if outcome.is_good]
@@ -82,6 +90,18 @@ class SparseDataTwin:
         """A picture of the first case of each kind."""
         first = {case.origin: case for case in reversed(self.design.cases())}
         return [Point(PICTURE, self._inputs(case)) for _, case in sorted(first.items(), reverse=True)]
+
+    @property
+    def _started(self) -> list[Point]:
+        """The default technique from bad starts, on some of the cases."""
+        if DEFAULT not in self.techniques:
+            return []
+        return [
+            Point(
+                STARTS, {**self._inputs(case), "technique": DEFAULT, "model": self._models[case.member].key}, cost=8.0
+            )
+            for case in self.design.cases()[::_STARTED]
+        ]
 
     def _inputs(self, case: CaseDesign) -> dict[str, Any]:
         truth = self._truths[case.member].key if case.origin == "packed" else None

@@ -26,6 +26,12 @@ def as_lines(values: Mapping[str, Any]) -> list[str]:
                 f"{row['milliseconds']['p95']:.0f} ms; {row['flagged']} of {row['cases']} with a status other than "
                 "converged"
             )
+    if (begun := values["starts"]) is not None:
+        apart = begun["apart_mm"]
+        lines.append(
+            f"starts    {begun['cases']} cases from three starts up to 30 mm and 30° off each: answers at most "
+            f"{apart['median']:.3g} mm apart in the median, {apart['worst']:.3g} mm in the worst case"
+        )
     if values["redrawn"]:
         lines.append(f"redrawn   {values['redrawn']} packings under which the truth found no equilibrium")
     lines += [f"failed    {message}" for message in values["failed"]]
@@ -53,7 +59,7 @@ def as_page(values: Mapping[str, Any], shown: Sequence[Picture]) -> bytes:
     lead = [
         f"{values['cases']} cases of livers of which 20 to 44 % of the surface is seen. They are a twin of the "
         "Sparse Data Challenge's, not its data: nothing here says how a technique would do there.",
-        *(line for line in as_lines(values) if line.startswith(("redrawn", "failed", "note"))),
+        *(line for line in as_lines(values) if line.startswith(("starts", "redrawn", "failed", "note"))),
     ]
     return page_as_html(Page("Registration from sparse surface data", lead, shown, [errors]))
 

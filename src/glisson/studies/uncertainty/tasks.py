@@ -23,7 +23,7 @@ from glisson.studies.registration.scoring import SCORE
 from glisson.studies.registration.solving_model import read_model
 from glisson.studies.registration.truths import build_case, carry_of
 
-TECHNIQUE = "linear-basis"
+TECHNIQUE = "tractions"
 LIVER = Task(f"{__name__}:score_liver", (*SCORE.packages, __name__))
 
 PROPOSED, RANDOM = "proposed", "random"
