@@ -15,7 +15,9 @@ from glisson.mechanics.registration.rows import Rows
 from glisson.mechanics.registration.seen import Seen
 
 _ITERATIONS = 60
-_STILL_MM = 0.1
+_STILL_MM = 0.3
+"""A step that moves no place of the patch by more is the last."""
+
 _LONGEST_MM = 15.0
 _HALVINGS = 5
 _LEAST = 1e-3  # variance of a way to move, as a share of the largest one's

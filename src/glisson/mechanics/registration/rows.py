@@ -56,8 +56,8 @@ def joined(parts: Sequence[Rows]) -> Rows:
     widest = max(part.nodes.shape[1] for part in parts)
 
     return Rows(
-        nodes=np.concatenate([np.pad(part.nodes, _missing(part, widest), mode="edge") for part in parts]),
-        weights=np.concatenate([np.pad(part.weights, _missing(part, widest)) for part in parts]),
+        nodes=np.concatenate([part.nodes[:, _columns(part, widest)] for part in parts]),
+        weights=np.concatenate([_widened(part, widest) for part in parts]),
         directions=np.concatenate([part.directions for part in parts]),
         gaps_mm=np.concatenate([part.gaps_mm for part in parts]),
         sigma_mm=np.concatenate([part.sigma_mm for part in parts]),
@@ -68,5 +68,12 @@ def joined(parts: Sequence[Rows]) -> Rows:
     )
 
 
-def _missing(part: Rows, widest: int) -> tuple[tuple[int, int], tuple[int, int]]:
-    return (0, 0), (0, widest - part.nodes.shape[1])
+def _columns(part: Rows, widest: int) -> IntArray:
+    columns: IntArray = np.minimum(np.arange(widest), part.nodes.shape[1] - 1)
+    return columns
+
+
+def _widened(part: Rows, widest: int) -> FloatArray:
+    weights = np.zeros((len(part.weights), widest))
+    weights[:, : part.weights.shape[1]] = part.weights
+    return weights

@@ -109,10 +109,9 @@ class SurfaceMatch:
         nodes = self._tree.triangles[nearest.triangles]
         arms = self._points - nearest.closest_mm
         corners = positions[nodes]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        touching = nearest.distance_mm < _TOUCHING_MM
-        directions = np.where(touching[:, None], normals, arms)
-        pulls = _along(_unit(directions), nearest.distance_mm, self._errors, nodes, nearest.barycentric, first, True)
+        touching = np.flatnonzero(nearest.distance_mm < _TOUCHING_MM)
+        arms[touching] = _normals(corners[touching])
+        pulls = _along(_unit(arms), nearest.distance_mm, self._errors, nodes, nearest.barycentric, first, True)
         return joined([pulls, *self._held(pulls, corners, nearest.barycentric)])
 
     def _held(self, pulls: Rows, corners: FloatArray, barycentric: FloatArray) -> list[Rows]:
@@ -221,6 +220,12 @@ def _across(along: FloatArray) -> tuple[FloatArray, FloatArray]:
     least = np.eye(3)[np.abs(unit).argmin(axis=1)]
     one = _unit(np.cross(unit, least))
     return one, np.cross(unit, one)
+
+
+def _normals(corners: FloatArray) -> FloatArray:
+    """Normals (t, 3), of any length, of triangles with corners (t, 3, 3)."""
+    normals: FloatArray = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return normals
 
 
 def _unit(vectors: FloatArray) -> FloatArray:
