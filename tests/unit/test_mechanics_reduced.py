@@ -21,7 +21,7 @@ from glisson.mechanics.reduced.estimate import ErrorEstimate
 from glisson.mechanics.reduced.full import FullModel
 from glisson.mechanics.reduced.live import LiveModel
 from glisson.mechanics.reduced.load import Load
-from glisson.mechanics.reduced.local import local_compliance
+from glisson.mechanics.reduced.local import Pulled, local_compliance
 from glisson.mechanics.reduced.model import ReducedModel
 from glisson.mechanics.reduced.packing import KIND, SCHEMA, pack, unpack
 from glisson.mechanics.reduced.points import elastic_points
@@ -125,9 +125,9 @@ def test_with_its_local_compliance_any_mode_answers_as_the_full_linear_model(ful
 def test_forces_and_stiffness_are_derivatives_of_the_energy(full: FullModel, reduced: ReducedModel) -> None:
     load = drawn(full, 1)
     start = reduced.solve(load.part(0.9))
-    pulls = reduced.local.on_nodes(load.nodes, load.forces)
+    pulled = Pulled.of(reduced.local, reduced.local.on_nodes(load.nodes, load.forces))
     contact = ReducedContact(
-        reduced.surface.in_modes(reduced.size), reduced.local, load, reduced.cushion, start.state.modal, pulls
+        reduced.surface.in_modes(reduced.size), reduced.local, load, reduced.cushion, start.state.modal, pulled
     )
     random = np.random.default_rng(1)
     unknowns = np.concatenate([start.state.modal, random.uniform(0.5, 2.0, len(contact.pushed))])
