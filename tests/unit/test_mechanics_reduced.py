@@ -19,7 +19,7 @@ from glisson.mechanics.reduced.contact import ReducedContact, reduced_surface
 from glisson.mechanics.reduced.cubature import choose_points
 from glisson.mechanics.reduced.estimate import ErrorEstimate
 from glisson.mechanics.reduced.full import FullModel
-from glisson.mechanics.reduced.live import LiveModel
+from glisson.mechanics.reduced.live import LiveModel, Update
 from glisson.mechanics.reduced.load import Load
 from glisson.mechanics.reduced.local import Pulled, local_compliance
 from glisson.mechanics.reduced.model import ReducedModel
@@ -85,6 +85,11 @@ def judged(full, model, loads, truths):
         raw.append(model.raw_error_mm(load, answer))
         errors.append(np.linalg.norm(model.positions(answer) - full.rest - truth, axis=1).max())
     return np.array(raw), np.array(errors)
+
+
+def brought_on(live: LiveModel, load: Load) -> Update:
+    """The last update of a load that comes on in steps."""
+    return [live.update(load.part(share)) for share in np.linspace(0.0, 1.0, 11)[1:]][-1]
 
 
 def test_all_modes_and_all_points_give_the_full_answer() -> None:
@@ -193,7 +198,7 @@ def test_truths_near_reduced_answers_are_those_on_the_way_from_rest(full: FullMo
 
 def test_a_load_unlike_all_others_falls_back_to_the_full_model(full: FullModel, reduced: ReducedModel) -> None:
     live = LiveModel(reduced, full, largest_mm=1.0)
-    usual = live.update(drawn(full, 300))
+    usual = brought_on(live, drawn(full, 300))
     assert not usual.fell_back
     assert usual.bound_mm <= 1.0
     far = full.model.node_set("far")
@@ -205,7 +210,31 @@ def test_a_load_unlike_all_others_falls_back_to_the_full_model(full: FullModel, 
         assert update.fell_back
         assert np.abs(update.positions - full.path(load)[-1]).max() < 1e-3
         live.reset()
-    assert live.update(drawn(full, 300)).bound_mm <= 1.0
+    assert brought_on(live, drawn(full, 300)).bound_mm <= 1.0
+
+
+def test_what_a_full_answer_has_shown_to_be_wrong_stays_known(full: FullModel, reduced: ReducedModel) -> None:
+    load = drawn(full, 301)  # with a bar
+    alone, shown = LiveModel(reduced, full, largest_mm=1e9), LiveModel(reduced, full, largest_mm=1e9)
+    for share in np.linspace(0.1, 0.8, 8):
+        alone.update(load.part(share))
+        last = shown.update(load.part(share))
+    shown._largest_mm = last.raw_mm
+    assert shown.update(load.part(0.85)).fell_back
+    alone.update(load.part(0.85))
+    part = load.part(0.9)
+    answers = [alone.update(part), shown.update(part)]
+    assert not answers[1].fell_back
+    errors = [np.linalg.norm(full.solve(part) - answer.positions, axis=1).max() for answer in answers]
+    assert errors[1] < 0.5 * errors[0]
+    assert errors[1] <= answers[1].bound_mm < answers[0].bound_mm
+
+
+def test_a_tool_where_no_compliance_is_known_is_seen_by_the_estimate(full: FullModel, reduced: ReducedModel) -> None:
+    end = np.array([20.0, 12.0, 30.0])  # over the held half
+    tool = CylinderTool(Cylinder("bar", end, end + [0.0, 0.0, 40.0], 10.0))
+    update = LiveModel(reduced, full, largest_mm=1.0).update(Load(tool=tool, approach=np.array([0.0, 0.0, -10.0])))
+    assert update.fell_back
 
 
 def test_a_world_that_is_turned_turns_the_answer(full: FullModel, reduced: ReducedModel) -> None:

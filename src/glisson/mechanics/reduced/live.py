@@ -16,7 +16,9 @@ from glisson.mechanics.reduced.model import Answer, ReducedModel, State, largest
 _UNKNOWN = 0.5  # share of a pull
 _JUMP_MM = 3.0  # by which the organ is not where it was going
 _DEEP_MM = 1.0  # at which a tool has gone through the surface
-_GROWING = 2.0  # how much faster errors grow than the load
+_UNEXPECTED = 0.15  # share of what it is not, in the estimate: where the organ gives way, small errors grow
+_GROWN = 2.0  # as many times an error is believed to have grown, at most
+_LEFT = 0.15  # share of an error that no full answer takes away from the ones after it
 _NEAR_MM = 2.0  # within which a reduced answer is that of a full one
 
 
@@ -35,16 +37,19 @@ class Update:
 
 @dataclass(frozen=True, eq=False)
 class _Shown:
-    """A reduced answer, and how far (n, 3) the full one next to it is."""
+    """A reduced answer with its raw estimate, and how far (n, 3) the full one next to it is."""
 
     answer: Answer
+    raw_mm: float
     apart: FloatArray
 
-    def uncertain(self, answer: Answer) -> float:
-        """What share of another answer's error is not known."""
+    def error(self, answer: Answer, raw_mm: float) -> tuple[FloatArray, float]:
+        """What another answer is wrong by (n, 3), as it grows with the estimate, and the estimate of what is left."""
         before = self.answer
         modal = _change(answer.state.modal, before.state.modal)
-        return min(1.0, _GROWING * max(modal, _change(answer.pulled + answer.pushed, before.pulled + before.pushed)))
+        local = _change(answer.pulled + answer.pushed, before.pulled + before.pushed)
+        left = min(1.0, _LEFT + max(modal, local))
+        return min(raw_mm / self.raw_mm, _GROWN) * self.apart, left * raw_mm
 
 
 class LiveModel:
@@ -74,20 +79,21 @@ class LiveModel:
         reduced, shown = self._reduced, self._shown
         expected = self._state.beyond(self._before)
         answer = self._answer(load, expected)
-        jumped = self._apart_mm(answer.state, expected) > _JUMP_MM
+        unexpected = self._apart_mm(answer.state, expected)
+        jumped = unexpected > _JUMP_MM
         if jumped:  # a tool was looked for where the organ no longer is
             answer = reduced.solve(load, answer.state)
         positions = reduced.positions(answer)
-        raw = float("inf")
-        if not jumped and answer.converged and self._is_known(load) and not self._is_pierced(answer):
-            raw = reduced.raw_error_mm(load, answer)
-            if shown is not None:
-                positions, raw = positions + shown.apart, raw * shown.uncertain(answer)
+        raw = own = float("inf") if jumped else self._raw_mm(load, answer)
+        if shown is not None and np.isfinite(own):
+            wrong, raw = shown.error(answer, own)
+            positions = positions + wrong
+        raw += _UNEXPECTED * unexpected
         if raw <= self._largest_mm:
             self._before, self._state = self._state, answer.state
             return Update(positions, reduced.estimate.bound_mm(raw), raw, False)
         positions = self._full.solve(load, positions)
-        self._go_on(load, positions, answer, jumped)
+        self._go_on(load, positions, answer, own)
         return Update(positions, 0.0, 0.0, True)
 
     def _answer(self, load: Load, expected: State) -> Answer:
@@ -97,17 +103,23 @@ class LiveModel:
                 break
         return answer
 
-    def _go_on(self, load: Load, positions: FloatArray, answer: Answer, jumped: bool) -> None:
+    def _go_on(self, load: Load, positions: FloatArray, answer: Answer, raw_mm: float) -> None:
         """From full positions (n, 3), next to which the answer may be; else one is looked for there."""
         reduced = self._reduced
         apart = positions - reduced.positions(answer)
         self._before = self._state
-        if jumped or largest(apart) > _NEAR_MM:
+        if not np.isfinite(raw_mm) or largest(apart) > _NEAR_MM:
             answer = reduced.solve(load, reduced.state(positions))
-            apart = positions - reduced.positions(answer)
+            apart, raw_mm = positions - reduced.positions(answer), self._raw_mm(load, answer)
             self._before = answer.state  # a jump does not go on
         self._state = answer.state
-        self._shown = _Shown(answer, apart) if largest(apart) <= _NEAR_MM else None
+        near = 0.0 < raw_mm < np.inf and largest(apart) <= _NEAR_MM
+        self._shown = _Shown(answer, raw_mm, apart) if near else None
+
+    def _raw_mm(self, load: Load, answer: Answer) -> float:
+        """The estimate of an answer's own error; infinite where nothing is known of it."""
+        known = answer.converged and self._is_known(load) and not self._is_pierced(answer)
+        return self._reduced.raw_error_mm(load, answer) if known else float("inf")
 
     def _is_known(self, load: Load) -> bool:
         """Whether most of a grasper's pull is where the local compliance is known; elsewhere no estimate sees it."""
