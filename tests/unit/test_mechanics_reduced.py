@@ -127,6 +127,20 @@ def test_with_its_local_compliance_any_mode_answers_as_the_full_linear_model(ful
     assert np.abs(model.positions(model.solve(load)) - full.rest - truth).max() < 1e-3 * np.abs(truth).max()
 
 
+def test_pulls_by_patterns_move_what_their_forces_move_one_by_one(reduced: ReducedModel) -> None:
+    local, random = reduced.local, np.random.default_rng(4)
+    turn = rotation(np.array([1.0, 2.0, 0.5]), 0.7)
+    shares = np.zeros((len(local.nodes), 2))
+    shares[3:9, 0], shares[5:14, 1] = random.uniform(size=6), random.uniform(size=9)
+    pulled = Pulled.of(local, shares @ random.normal(size=(2, 3)))
+    again = shares @ random.normal(size=(2, 3))
+    same = pulled.by(again)
+    assert same is not None
+    alone = np.einsum("kin...,ki->n...", local.fields, again @ turn) @ turn.T
+    assert np.abs(same.displacement(turn) - alone).max() < 1e-5 * np.abs(alone).max()
+    assert pulled.by(random.normal(size=again.shape)) is None
+
+
 def test_forces_and_stiffness_are_derivatives_of_the_energy(full: FullModel, reduced: ReducedModel) -> None:
     load = drawn(full, 1)
     start = reduced.solve(load.part(0.9))
