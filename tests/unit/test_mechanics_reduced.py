@@ -19,9 +19,9 @@ from glisson.mechanics.reduced.contact import ReducedContact, reduced_surface
 from glisson.mechanics.reduced.cubature import choose_points
 from glisson.mechanics.reduced.estimate import ErrorEstimate
 from glisson.mechanics.reduced.full import FullModel
-from glisson.mechanics.reduced.live import LiveModel
+from glisson.mechanics.reduced.live import LiveModel, Update
 from glisson.mechanics.reduced.load import Load
-from glisson.mechanics.reduced.local import local_compliance
+from glisson.mechanics.reduced.local import Pulled, local_compliance
 from glisson.mechanics.reduced.model import ReducedModel
 from glisson.mechanics.reduced.packing import KIND, SCHEMA, pack, unpack
 from glisson.mechanics.reduced.points import elastic_points
@@ -87,6 +87,11 @@ def judged(full, model, loads, truths):
     return np.array(raw), np.array(errors)
 
 
+def brought_on(live: LiveModel, load: Load) -> Update:
+    """The last update of a load that comes on in steps."""
+    return [live.update(load.part(share)) for share in np.linspace(0.0, 1.0, 11)[1:]][-1]
+
+
 def test_all_modes_and_all_points_give_the_full_answer() -> None:
     full = FullModel(bar_model((4, 2, 2)), ("held",))
     free = np.flatnonzero(~full.fixed.ravel())
@@ -122,12 +127,26 @@ def test_with_its_local_compliance_any_mode_answers_as_the_full_linear_model(ful
     assert np.abs(model.positions(model.solve(load)) - full.rest - truth).max() < 1e-3 * np.abs(truth).max()
 
 
+def test_pulls_by_patterns_move_what_their_forces_move_one_by_one(reduced: ReducedModel) -> None:
+    local, random = reduced.local, np.random.default_rng(4)
+    turn = rotation(np.array([1.0, 2.0, 0.5]), 0.7)
+    shares = np.zeros((len(local.nodes), 2))
+    shares[3:9, 0], shares[5:14, 1] = random.uniform(size=6), random.uniform(size=9)
+    pulled = Pulled.of(local, shares @ random.normal(size=(2, 3)))
+    again = shares @ random.normal(size=(2, 3))
+    same = pulled.by(again)
+    assert same is not None
+    alone = np.einsum("kin...,ki->n...", local.fields, again @ turn) @ turn.T
+    assert np.abs(same.displacement(turn) - alone).max() < 1e-5 * np.abs(alone).max()
+    assert pulled.by(random.normal(size=again.shape)) is None
+
+
 def test_forces_and_stiffness_are_derivatives_of_the_energy(full: FullModel, reduced: ReducedModel) -> None:
     load = drawn(full, 1)
     start = reduced.solve(load.part(0.9))
-    pulls = reduced.local.on_nodes(load.nodes, load.forces)
+    pulled = Pulled.of(reduced.local, reduced.local.on_nodes(load.nodes, load.forces))
     contact = ReducedContact(
-        reduced.surface.in_modes(reduced.size), reduced.local, load, reduced.cushion, start.state.modal, pulls
+        reduced.surface.in_modes(reduced.size), reduced.local, load, reduced.cushion, start.state.modal, pulled
     )
     random = np.random.default_rng(1)
     unknowns = np.concatenate([start.state.modal, random.uniform(0.5, 2.0, len(contact.pushed))])
@@ -193,7 +212,7 @@ def test_truths_near_reduced_answers_are_those_on_the_way_from_rest(full: FullMo
 
 def test_a_load_unlike_all_others_falls_back_to_the_full_model(full: FullModel, reduced: ReducedModel) -> None:
     live = LiveModel(reduced, full, largest_mm=1.0)
-    usual = live.update(drawn(full, 300))
+    usual = brought_on(live, drawn(full, 300))
     assert not usual.fell_back
     assert usual.bound_mm <= 1.0
     far = full.model.node_set("far")
@@ -205,7 +224,31 @@ def test_a_load_unlike_all_others_falls_back_to_the_full_model(full: FullModel, 
         assert update.fell_back
         assert np.abs(update.positions - full.path(load)[-1]).max() < 1e-3
         live.reset()
-    assert live.update(drawn(full, 300)).bound_mm <= 1.0
+    assert brought_on(live, drawn(full, 300)).bound_mm <= 1.0
+
+
+def test_what_a_full_answer_has_shown_to_be_wrong_stays_known(full: FullModel, reduced: ReducedModel) -> None:
+    load = drawn(full, 301)  # with a bar
+    alone, shown = LiveModel(reduced, full, largest_mm=1e9), LiveModel(reduced, full, largest_mm=1e9)
+    for share in np.linspace(0.1, 0.8, 8):
+        alone.update(load.part(share))
+        last = shown.update(load.part(share))
+    shown._largest_mm = last.raw_mm
+    assert shown.update(load.part(0.85)).fell_back
+    alone.update(load.part(0.85))
+    part = load.part(0.9)
+    answers = [alone.update(part), shown.update(part)]
+    assert not answers[1].fell_back
+    errors = [np.linalg.norm(full.solve(part) - answer.positions, axis=1).max() for answer in answers]
+    assert errors[1] < 0.5 * errors[0]
+    assert errors[1] <= answers[1].bound_mm < answers[0].bound_mm
+
+
+def test_a_tool_where_no_compliance_is_known_is_seen_by_the_estimate(full: FullModel, reduced: ReducedModel) -> None:
+    end = np.array([20.0, 12.0, 30.0])  # over the held half
+    tool = CylinderTool(Cylinder("bar", end, end + [0.0, 0.0, 40.0], 10.0))
+    update = LiveModel(reduced, full, largest_mm=1.0).update(Load(tool=tool, approach=np.array([0.0, 0.0, -10.0])))
+    assert update.fell_back
 
 
 def test_a_world_that_is_turned_turns_the_answer(full: FullModel, reduced: ReducedModel) -> None:

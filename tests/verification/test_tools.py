@@ -121,6 +121,23 @@ def test_distances_to_a_slotted_board_are_those_to_many_points_of_it() -> None:
     assert np.abs(found - nearest)[found > 0.0].max() < 0.1
 
 
+def test_distances_to_a_cylinder_are_those_to_many_points_of_its_line() -> None:
+    start, end = np.array([1.0, 2.0, 3.0]), np.array([5.0, 2.0, 9.0])
+    bar = make_tool(Cylinder("bar", start, end, 1.5))
+    points = np.random.default_rng(2).uniform(-4.0, 14.0, (60, 3))
+    line = start + np.linspace(0.0, 1.0, 20001)[:, None] * (end - start)
+    nearest = np.array([np.linalg.norm(line - point, axis=1).min() for point in points]) - 1.5
+    assert np.abs(bar.distance(points) - nearest).max() < 1e-6
+    normals, hessians = bar.derivatives(points)
+    step = 1e-5
+    for axis in range(3):
+        ahead, behind = points + step * np.eye(3)[axis], points - step * np.eye(3)[axis]
+        slope = (bar.distance(ahead) - bar.distance(behind)) / (2.0 * step)
+        change = (bar.derivatives(ahead)[0] - bar.derivatives(behind)[0]) / (2.0 * step)
+        assert np.abs(normals[:, axis] - slope).max() < 1e-8
+        assert np.abs(hessians[:, :, axis] - change).max() < 1e-6
+
+
 def test_a_tool_that_never_touches_is_told() -> None:
     bar = Cylinder("bar", np.array([30.0, -20.0, 40.0]), np.array([30.0, 50.0, 40.0]), 4.0)
     down = Stage("press", STICKY, gravity=False, fixed=("left",), motions=(ToolMotion("bar", (0.0, 0.0, -10.0)),))

@@ -11,7 +11,7 @@ from glisson.geometry.compiled import compiled
 from glisson.mechanics.contact_law import Cushion
 from glisson.mechanics.elements import SurfaceQuadrature
 from glisson.mechanics.reduced.load import Load
-from glisson.mechanics.reduced.local import LocalCompliance, turn_of
+from glisson.mechanics.reduced.local import LocalCompliance, Pulled, turn_of
 from glisson.mechanics.reduced.pressing import Pressing
 
 _REACH_MM = 12.0  # gap within which surface nodes of the last state are candidates …
@@ -71,7 +71,7 @@ class ReducedContact:
         load: with a tool.
         cushion: between both.
         modal: (r,) state near which candidates are looked for.
-        dead: (k, 3) what else acts on the nodes of the local compliance.
+        pulled: what else moves the surface beyond the modes.
     """
 
     def __init__(
@@ -81,7 +81,7 @@ class ReducedContact:
         load: Load,
         cushion: Cushion,
         modal: FloatArray,
-        dead: FloatArray,
+        pulled: Pulled,
     ) -> None:
         pressing = Pressing.of(load, cushion)
         assert pressing is not None  # asked for only where there is a tool
@@ -95,6 +95,7 @@ class ReducedContact:
         corners = self._rest[self._faces]
         self._size = 1.5 * float(np.linalg.norm(corners - corners.mean(axis=1, keepdims=True), axis=2).max(initial=0.0))
         reached = surface.local[nodes]
+        self._unreached = reached < 0
         pushed = np.flatnonzero((gaps[nodes] < _PUSHED_MM) & (reached >= 0))
         self.turn = turn_of(self._rest, places[nodes])
         self.pushed = reached[pushed]
@@ -103,18 +104,17 @@ class ReducedContact:
         rows = np.flatnonzero(reached >= 0)
         moved = np.zeros((len(nodes), 3, len(pushed)))
         moved[rows] = _moved(local.compliance, reached[rows], self.pushed, self.normals, self.turn)
-        pulled = np.flatnonzero(dead.any(axis=1))
-        self._rest[rows] += _shifts(local.compliance, reached[rows], pulled, dead[pulled], self.turn)
+        self._rest[rows] += pulled.displacement(self.turn, local.nodes[reached[rows]])
         self._moved = moved
         self._basis = np.concatenate([surface.basis[nodes], moved], axis=2)
         self.compliance = np.einsum("ci,cid->cd", self.normals, moved[pushed]) + _LEAST * np.eye(len(pushed))
         """Of pushes against each other (c, c), in mm/mN."""
         self._last: tuple[FloatArray, _Touching] | None = None
 
-    def in_modes(self, surface: ReducedSurface) -> "ReducedContact":
-        """The same candidates and pushes on a surface in other modes."""
+    def in_modes(self, surface: ReducedSurface, unknowns: FloatArray) -> "ReducedContact":
+        """The same on a surface in more modes, at unknowns (R + c,) that leave it where it is."""
         other = copy(self)
-        other._last = None
+        other._last = None if self._last is None else (unknowns, self._last[1])
         other._basis = np.concatenate([surface.basis[self._nodes], self._moved], axis=2)
         return other
 
@@ -125,22 +125,36 @@ class ReducedContact:
 
     def forces(self, unknowns: FloatArray) -> FloatArray:
         """Force of the tool on the unknowns (r + c,)."""
+        nodal = self._nodal(unknowns)
+        used = np.flatnonzero(nodal.any(axis=1))
+        result: FloatArray = nodal[used].ravel() @ self._basis[used].reshape(-1, self._basis.shape[2])
+        return result
+
+    def unknown_force(self, unknowns: FloatArray) -> float:
+        """Force in mN on nodes where it is not known how they give way."""
+        return float(np.linalg.norm(self._nodal(unknowns)[self._unreached], axis=1).sum())
+
+    def depth_mm(self, unknowns: FloatArray) -> float:
+        """How deep the tool is in the surface."""
+        return float(-self._touching(unknowns).gaps.min(initial=0.0))
+
+    def _nodal(self, unknowns: FloatArray) -> FloatArray:
+        """Forces of the tool on the candidates' nodes (m, 3)."""
         touching = self._touching(unknowns)
         pushes = (touching.areas * self._pressing.cushion.pressure(touching.gaps))[:, None] * touching.normals
         nodal = np.zeros_like(self._rest)
         np.add.at(nodal, touching.nodes, touching.shapes[:, :, None] * pushes[:, None, :])
-        used = np.unique(touching.nodes)
-        result: FloatArray = np.tensordot(nodal[used], self._basis[used], 2)
-        return result
+        return nodal
 
     def stiffness(self, unknowns: FloatArray, project: bool) -> FloatArray:
         """∂² of the energy by the unknowns (r + c, r + c)."""
-        touching = self._touching(unknowns)
-        local = self._pressing.stiffness(
-            touching.gaps, touching.areas, touching.normals, None if project else touching.curvatures
-        )
-        size = self._basis.shape[2]
-        basis = np.einsum("pa,paix->pix", touching.shapes, self._basis[touching.nodes])
+        touching, size = self._touching(unknowns), self._basis.shape[2]
+        basis = _at_points(touching.shapes, touching.nodes, self._basis)
+        if project:
+            slopes = touching.areas * self._pressing.cushion.slope(touching.gaps)
+            along = (touching.normals[:, None, :] @ basis)[:, 0]
+            return along.T @ (slopes[:, None] * along)
+        local = self._pressing.stiffness(touching.gaps, touching.areas, touching.normals, touching.curvatures)
         result: FloatArray = basis.reshape(-1, size).T @ (local @ basis).reshape(-1, size)
         return result
 
@@ -179,16 +193,15 @@ class _Touching:
 
 
 @compiled
-def _shifts(compliance: FloatArray, rows: IntArray, pulled: IntArray, dead: FloatArray, turn: FloatArray) -> FloatArray:
-    """Displacements (m, 3) of the nodes `rows` (m,) by dead forces (d, 3) on the nodes `pulled` (d,)."""
-    shifts = np.zeros((len(rows), 3))
-    for d in range(len(pulled)):
-        force = turn.T @ dead[d]
-        for c in range(len(rows)):
-            for j in range(3):
-                for i in range(3):
-                    shifts[c, i] += compliance[pulled[d], j, rows[c], i] * force[j]
-    return shifts @ turn.T
+def _at_points(shapes: FloatArray, nodes: IntArray, basis: FloatArray) -> FloatArray:
+    """The basis (m, 3, r) of nodes at points (p, 3, r) whose faces' nodes (p, a) have shares (p, a)."""
+    result = np.zeros((len(nodes), 3, basis.shape[2]))
+    for p in range(len(nodes)):
+        for a in range(nodes.shape[1]):
+            for i in range(3):
+                for r in range(basis.shape[2]):
+                    result[p, i, r] += shapes[p, a] * basis[nodes[p, a], i, r]
+    return result
 
 
 @compiled

@@ -17,10 +17,11 @@ from glisson.mechanics.reduced.load import Load
 from glisson.mechanics.reduced.minimise import Minimum, minimise, rounding_uj
 from glisson.mechanics.reduced.pressing import Pressing
 
-TOLERANCE = 1e-7
+TOLERANCE = 1e-6
 _LIMIT = 40
 _STEPS = 2  # in which a load comes on
 _SHORTEST = 1.0 / 64.0
+_FAST = 0.3  # share of a residual that a step may leave, without a new stiffness being factored
 _SURFACE_PARTS = 2  # of every side of a face, for contact
 _CUSHION = Cushion(range_mm=1.0, stiffness_kpa_mm=36.0, hardening=0.0)
 
@@ -96,6 +97,8 @@ class FullPotential:
         self._forces = full.dead_forces(load)
         self._pressing = Pressing.of(load, full.cushion)
         self.rounding = rounding_uj(full.elasticity.softest_kpa, full.volume_mm3)
+        self._before: float | None = None
+        self._last: tuple[FloatArray, FloatArray] | None = None
 
     def energy(self, positions: FloatArray) -> float:
         """In µJ."""
@@ -112,7 +115,7 @@ class FullPotential:
     def gradient(self, positions: FloatArray) -> FloatArray:
         """What is unbalanced (n, 3), zero where held."""
         full = self._full
-        gradient = full.elasticity.forces(positions) - self._forces - self.pushes(positions)
+        gradient = self._elastic(positions) - self._forces - self.pushes(positions)
         gradient[full.fixed] = 0.0
         return gradient
 
@@ -130,9 +133,11 @@ class FullPotential:
         return full.surface.scatter(pushes)
 
     def step(self, positions: FloatArray, gradient: FloatArray) -> FloatArray:
-        """Newton's step (n, 3)."""
+        """Newton's step (n, 3); with the last factor, a tenth of the work, as long as the residual falls fast."""
         full = self._full
-        for project in (False, True):
+        residual = self.residual(positions, gradient)
+        slow, self._before = self._before is None or residual > _FAST * self._before, residual
+        for project in (False, True) if slow else ():
             if full.solver.factor(Stiffness(full.pattern, full.system, self.blocks(positions, project), positions)):
                 break
         step = full.solver.solve(-gradient, 0.0)
@@ -156,6 +161,11 @@ class FullPotential:
 
     def residual(self, positions: FloatArray, gradient: FloatArray) -> float:
         """Unbalanced force over the largest of the dead and the internal ones."""
-        full = self._full
-        scale = max(float(np.linalg.norm(self._forces)), float(np.linalg.norm(full.elasticity.forces(positions))))
+        scale = max(float(np.linalg.norm(self._forces)), float(np.linalg.norm(self._elastic(positions))))
         return float(np.linalg.norm(gradient)) / scale if scale > 0.0 else 0.0
+
+    def _elastic(self, positions: FloatArray) -> FloatArray:
+        """Internal forces (n, 3); those of the last positions are kept."""
+        if self._last is None or self._last[0] is not positions:
+            self._last = (positions, self._full.elasticity.forces(positions))
+        return self._last[1]

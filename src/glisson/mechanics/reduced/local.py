@@ -5,7 +5,7 @@ the full model at rest, a force f on surface nodes moves the organ by (K⁻¹ �
 residual flexibility, as in component mode synthesis (Craig and Chang 1977). It turns with the organ.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from glisson.geometry.compiled import compiled
 from glisson.geometry.rotations import nearest_rotation
 from glisson.mechanics.pattern import Stiffness
 from glisson.mechanics.reduced.full import FullModel
+
+_ALL = slice(None)
+_SAME = 1e-9  # share of forces by which they may leave a pattern
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +45,43 @@ class LocalCompliance:
         flat = self.fields.reshape(len(self.nodes), 3, -1)
         found = _summed(flat, pushed, (forces @ turn).astype(flat.dtype))
         result: FloatArray = found.reshape(-1, 3).astype(np.float64) @ turn.T
+        return result
+
+    @property
+    def mean_mm_per_mn(self) -> float:
+        """By how much a node gives way to a force on it."""
+        return float(np.einsum("kiki->", self.compliance)) / (3.0 * len(self.nodes))
+
+
+@dataclass(frozen=True, eq=False)
+class Pulled:
+    """What pulls move beyond the modes: the sum of few patterns (j,) of `shares` (k, j) between the nodes.
+
+    `fields` (j, 3, n, 3) in mm/mN are the displacements of a pattern's unit pull along each axis, `pulls` (j, 3) in mN.
+    """
+
+    shares: FloatArray
+    fields: FloatArray
+    pulls: FloatArray
+
+    @classmethod
+    def of(cls, local: LocalCompliance, forces: FloatArray) -> "Pulled":
+        """Of forces (k, 3) on the nodes of a local compliance."""
+        left, sizes, _ = np.linalg.svd(forces, full_matrices=False)
+        shares = left[:, sizes > _SAME * sizes[0]]
+        used = np.flatnonzero(shares.any(axis=1))
+        fields = np.tensordot(shares[used].T.astype(local.fields.dtype), local.fields[used], 1)
+        return cls(shares, fields, shares.T @ forces)
+
+    def by(self, forces: FloatArray) -> "Pulled | None":
+        """The same patterns by other forces (k, 3); None where these have other patterns."""
+        pulls = self.shares.T @ forces
+        apart = np.linalg.norm(forces - self.shares @ pulls)
+        return replace(self, pulls=pulls) if apart <= _SAME * np.linalg.norm(forces) else None
+
+    def displacement(self, turn: FloatArray, nodes: IntArray | slice = _ALL) -> FloatArray:
+        """Of the nodes (m,) of the mesh, (m, 3) in mm, where the organ has turned by `turn` (3, 3)."""
+        result: FloatArray = np.tensordot(self.pulls @ turn, self.fields[:, :, nodes], 2) @ turn.T
         return result
 
 

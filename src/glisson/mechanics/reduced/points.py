@@ -22,7 +22,8 @@ _IDENTITY = np.eye(3).ravel()
 class ElasticPoints:
     """Points at which the body is strained by its modes.
 
-    `strains` (m, 9, r) in 1/mm are the modes' displacement gradients, `weights` (m,) in mm³, `regions` (m,) ascending.
+    `strains` (m, 9, r) in 1/mm are the modes' displacement gradients, in double or single precision, `weights` (m,) in
+    mm³, `regions` (m,) ascending.
     """
 
     strains: FloatArray
@@ -49,8 +50,8 @@ class ElasticPoints:
         return sum(rounding_uj(m.young_modulus_kpa, float(self.weights[run].sum())) for run, m in self._runs)
 
     def gradients(self, modal: FloatArray) -> FloatArray:
-        """Deformation gradients (m, 3, 3) at modal displacements (r,)."""
-        result: FloatArray = (self._flat @ modal).reshape(-1, 9) + _IDENTITY
+        """Deformation gradients (m, 3, 3) at displacements by the first modes (≤ r,)."""
+        result: FloatArray = (self._flat[:, : len(modal)] @ modal.astype(self._flat.dtype)).reshape(-1, 9) + _IDENTITY
         return result.reshape(-1, 3, 3)
 
     def energy(self, gradients: FloatArray) -> float:
@@ -67,7 +68,7 @@ class ElasticPoints:
 
     def forces(self, gradients: FloatArray) -> FloatArray:
         """Internal forces ∂Ψ/∂q (r,)."""
-        result: FloatArray = self.stresses(gradients).ravel() @ self._flat
+        result: FloatArray = self.stresses(gradients).ravel().astype(self._flat.dtype) @ self._flat
         return result
 
     def stiffness(self, gradients: FloatArray, project: bool = False) -> FloatArray:

@@ -55,7 +55,7 @@ _MOST_DRAWS = 4  # for each load whose tip moves as far as wanted
 
 @dataclass(frozen=True)
 class Plan:
-    """How many loads serve for what, the sizes of models, and the bound in mm from which on the full model answers.
+    """How many loads serve for what, the sizes of models, and the estimate in mm above which the full model answers.
 
     `pulls` come on from rest, `training` ones from a first reduced model, `checked` ones both ways.
     """
@@ -108,13 +108,9 @@ class ReducedBenchmark:
         # Small matrices: more threads wait for each other for longer than they work.
         with exclusive(self._out), threadpool_limits(1, user_api="blas"):
             reduced = self._reduced()
-            calibration, errors, _ = self._judged(
-                reduced, _CALIBRATION_SEED, self._plan.calibration, np.inf, "calibration"
-            )
+            calibration, errors, _ = self._judged(reduced, _CALIBRATION_SEED, self._plan.calibration, "calibration")
             reduced = replace(reduced, estimate=reduced.estimate.calibrated(calibration.raw_mm, errors))
-            followed, errors, loads = self._judged(
-                reduced, self._seed, self._plan.loads, self._plan.largest_mm, "unseen loads"
-            )
+            followed, errors, loads = self._judged(reduced, self._seed, self._plan.loads, "unseen loads")
             moved = np.linalg.norm(followed.positions[:, self._tip] - self._full.rest[self._tip], axis=1)
             touching = np.array([load.tool is not None for load in loads])
             apart, seconds = self._from_rest(loads, followed.positions)
@@ -157,10 +153,10 @@ class ReducedBenchmark:
         return unpack(self._kept("model", by, KIND, SCHEMA, build))
 
     def _judged(
-        self, reduced: ReducedModel, seed: int, count: int, largest_mm: float, words: str
+        self, reduced: ReducedModel, seed: int, count: int, words: str
     ) -> tuple[Followed, FloatArray, list[Load]]:
         """Answers to so many loads, their largest errors (k,) in mm, and the loads."""
-        live = LiveModel(reduced, self._full, largest_mm)
+        live = LiveModel(reduced, self._full, self._plan.largest_mm)
         parts: list[Followed] = []
         errors: list[FloatArray] = []
         loads: list[Load] = []

@@ -67,14 +67,19 @@ class Draw:
         return surface[near], (shares[near] / shares[near].sum())[:, None] * pull
 
     def _bar(self, random: np.random.Generator) -> tuple[CylinderTool, FloatArray]:
-        places, _, normals = self._surface
-        at = int(random.integers(len(places)))
-        inward = -normals[at] + _SLANT * random.normal(size=3) / np.sqrt(2.0)
-        inward /= np.linalg.norm(inward)
-        radius, depth = random.uniform(*_RADIUS_MM), random.uniform(*_DEPTH_MM)
-        end = places[at] + (depth - radius) * inward
-        bar = CylinderTool(Cylinder("bar", end - _SHAFT_MM * inward, end, radius))
-        return bar, (depth + _CLEAR_MM) * inward
+        """A bar, and the way by which it came from where it did not touch."""
+        places, surface, normals = self._surface
+        nodes = self.model.mesh.nodes[surface]
+        while True:
+            at = int(random.integers(len(places)))
+            inward = -normals[at] + _SLANT * random.normal(size=3) / np.sqrt(2.0)
+            inward /= np.linalg.norm(inward)
+            radius, depth = random.uniform(*_RADIUS_MM), random.uniform(*_DEPTH_MM)
+            end = places[at] + (depth - radius) * inward
+            bar = CylinderTool(Cylinder("bar", end - _SHAFT_MM * inward, end, radius))
+            approach = (depth + _CLEAR_MM) * inward
+            if bar.distance(nodes + approach).min() > 0.0:
+                return bar, approach
 
     @cached_property
     def _surface(self) -> tuple[FloatArray, IntArray, FloatArray]:

@@ -12,12 +12,12 @@ from glisson.studies.reduced.liver import sofa_liver
 WHOLE = Plan(
     pulls=40,
     training=450,
-    calibration=200,
+    calibration=400,
     loads=1000,
     checked=20,
     first=Sizes(40, 250, 40, 250, 1e-3),
     sizes=Sizes(60, 450, 140, 800, 2e-4),
-    largest_mm=1.2,
+    largest_mm=0.3,
 )
 QUICK = Plan(
     pulls=15,
@@ -27,7 +27,7 @@ QUICK = Plan(
     checked=3,
     first=Sizes(20, 120, 20, 120, 1e-3),
     sizes=Sizes(40, 300, 80, 500, 5e-4),
-    largest_mm=4.0,
+    largest_mm=1.0,
 )
 
 
