@@ -29,7 +29,9 @@ _RIGID = Material("linear-elastic", 1e4, 0.3, 0.0)
 class LiftSettings:
     """How far and with what contact. Stiffnesses in kPa/mm; some 10 E per mm keeps penetration small.
 
-    `settling` are the coefficients of friction of stage 2 in turn, the last being the true one.
+    `settling` are the coefficients of friction of stage 2 in turn, before the true one. The lever turns in steps
+    of about `step_deg` along chords, in increments of at most `largest_deg`, the first a tenth of that; more, and
+    contact is thrown far off. `settling_part` is the first increment of a step of stage 2, as a fraction.
     """
 
     angle_deg: float
@@ -37,6 +39,8 @@ class LiftSettings:
     sticky: float = 0.5
     settling: tuple[float, ...] = (0.4, 0.3, 0.22, 0.16, 0.13)
     step_deg: float = 5.5
+    largest_deg: float = 1.0
+    settling_part: float = 0.2
     normal_kpa_mm: float = 60.0
     tangent_kpa_mm: float = 12.0
     residual: float = 0.005
@@ -89,13 +93,16 @@ def write_lift_deck(path: Path, organ: LiftOrgan, lever: Lever, settings: LiftSe
 
     step(Increments(first=0.1), 0.0, None, gravity=True)
     angles = np.linspace(0.0, settings.angle_deg, max(1, round(settings.angle_deg / settings.step_deg)) + 1)[1:]
-    # A tenth of a degree to begin with and at most one: more and contact is thrown far off.
-    turning = Increments(first=0.1 / settings.step_deg, largest=min(1.0, 1.0 / settings.step_deg))
+    turning = Increments(
+        first=0.1 * settings.largest_deg / settings.step_deg,
+        largest=min(1.0, settings.largest_deg / settings.step_deg),
+    )
     for number, angle in enumerate(angles):
         step(turning, float(angle), settings.sticky if number == 0 else None)
     lowered = (*settings.settling, settings.friction)
+    settling = Increments(first=settings.settling_part, largest=min(1.0, 1.5 * settings.settling_part))
     for friction in lowered:
-        step(Increments(first=0.2, largest=0.3), settings.angle_deg, friction)
+        step(settling, settings.angle_deg, friction)
     path.write_text(deck.text)
     return LiftSteps(1, 1 + len(angles), 1 + len(angles) + len(lowered))
 
