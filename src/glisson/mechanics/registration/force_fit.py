@@ -15,7 +15,7 @@ from glisson.mechanics.registration.rows import Rows
 from glisson.mechanics.registration.seen import Seen
 
 _ITERATIONS = 60
-_STILL_MM = 0.3
+_STILL_MM = 0.1
 """A step that moves no place of the patch by more is the last."""
 
 _LONGEST_MM = 15.0
