@@ -88,6 +88,12 @@ def test_the_levers_angle_is_found_and_the_block_with_it(truth: Deformation) -> 
     assert np.linalg.norm(carried - true, axis=1).max() < 0.4
     again = prepared.register(seen_of(truth))
     assert np.array_equal(again.positions_mm, found.positions_mm)
+    lying = replace(
+        seen_of(truth).items[0], name="sponge", points_mm=seen_of(truth).items[0].points_mm + [0.0, 0.0, 15.0]
+    )
+    doubted = prepared.register(Observations((*seen_of(truth).items, lying)))
+    assert doubted.status is Status.AMBIGUOUS
+    assert "'sponge' by" in doubted.deformation.message
 
 
 def test_derivatives_of_the_joint_cost_are_those_of_differences(truth: Deformation) -> None:

@@ -17,6 +17,7 @@ from glisson.core.status import Status
 from glisson.mechanics.quadratic_model import quadratic_model
 from glisson.mechanics.registration.basis import ElasticModes, boundary_responses
 from glisson.mechanics.registration.checks import check_observations
+from glisson.mechanics.registration.contradictions import contradiction, misfits
 from glisson.mechanics.registration.elastic_parameters import ERROR_HELP, LENGTH_HELP
 from glisson.mechanics.registration.expected_energy import energy_per_mode_uj
 from glisson.mechanics.registration.fitting import Fit, fit
@@ -140,8 +141,7 @@ class PreparedScenario:
                 f'The scenario\'s tools are in the frame "patient" and the observations in "{observations.frame}"; '
                 "transform them into that of the patient first."
             )
-        error = ModelError(self._parameters.model_error_mm, self._parameters.model_error_length_mm)
-        seen = Seen(self._places, observations, error)
+        seen = self._seen(observations)
         tangent, found, settled = self.tangent, None, False
         for number in range(self._parameters.solves):
             progress(number / self._parameters.solves, "adjusting the manoeuvre")
@@ -154,7 +154,19 @@ class PreparedScenario:
             if settled:
                 break
         motion, found = self._fitted(tangent, seen, observations, found)
-        return self._answer(motion, found, settled)
+        wrong = misfits(seen, found.rows, found.shifts_mm)
+        doubt = contradiction(observations, wrong, lambda some: self._fits(tangent, some))
+        return self._answer(motion, found, settled, doubt)
+
+    def _seen(self, observations: Observations) -> Seen:
+        error = ModelError(self._parameters.model_error_mm, self._parameters.model_error_length_mm)
+        return Seen(self._places, observations, error)
+
+    def _fits(self, tangent: Tangent, observations: Observations) -> bool:
+        """Whether some observations fit together next to the adjusted manoeuvre, as its derivative predicts."""
+        seen = self._seen(observations)
+        _, found = self._fitted(tangent, seen, observations, None)
+        return not misfits(seen, found.rows, found.shifts_mm)
 
     def _fitted(
         self, tangent: Tangent, seen: Seen, observations: Observations, last: Fit | None
@@ -169,9 +181,9 @@ class PreparedScenario:
         start = motion.state(np.zeros(motion.size)) if last is None else last.state
         return motion, fit(motion, seen, start)
 
-    def _answer(self, motion: ScenarioMotion, found: Fit, settled: bool) -> Registered:
+    def _answer(self, motion: ScenarioMotion, found: Fit, settled: bool, doubt: str | None) -> Registered:
         positions, spread = motion.positions(found.state), spread_by(found.hessian, motion, found)
-        answer = outcome(self._model, "patient", positions, spread, found.beliefs, None)
+        answer = outcome(self._model, "patient", positions, spread, found.beliefs, doubt)
         answer = replace(answer, notes=(*answer.notes, *self._notes(motion, found)))
         if settled or not answer.status.is_good:
             return answer
