@@ -139,7 +139,9 @@ def deformation() -> Deformation:
 
 def observations() -> Observations:
     rng = np.random.default_rng(3)
-    full = Observation("surface", "", rng.random((3, 3)), 0.5, "room", 1.25, rng.random((3, 3)), rng.random((3, 3, 3)))
+    roots = rng.random((3, 3, 3))
+    spread = roots @ roots.transpose(0, 2, 1)
+    full = Observation("surface", "", rng.random((3, 3)), 0.5, "room", 1.25, rng.random((3, 3)), spread)
     return Observations((full, Observation("landmark", "tip", rng.random((1, 3)), 2.0, "room")))
 
 

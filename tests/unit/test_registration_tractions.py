@@ -12,6 +12,7 @@ from glisson.core.model import Material, Model
 from glisson.core.observations import Observation, Observations
 from glisson.core.registered import Registered
 from glisson.core.registry import make_technique
+from glisson.core.status import Status
 from glisson.mechanics.registration.floating import FloatingBody, rigid_motions
 from glisson.mechanics.registration.second_order import SecondOrderMotion, second_derivatives
 from glisson.mechanics.registration.tractions import TractionsParameters, likely_modes
@@ -100,6 +101,17 @@ def test_likely_motions_are_as_far_as_is_said(model: Model, modes: FloatArray) -
     rng = np.random.default_rng(2)
     drawn = modes @ rng.normal(size=(modes.shape[2], 4000))
     assert np.sqrt((drawn**2).sum(axis=1).mean()) == pytest.approx(9.0, rel=0.03)
+
+
+def test_a_doubt_stays_as_long_as_nothing_new_is_seen(model: Model) -> None:
+    """A bar's flat side may be its other side: the next frame, which shows the same, cannot settle that."""
+    nodes = model.mesh.nodes
+    top = nodes[nodes[:, 2] == nodes[:, 2].max()]
+    prepared = make_technique("registration", "tractions", {}, "the test").prepare(model)
+    observations = Observations((Observation("surface", "whole", top, 0.5, "room"),))
+    first = prepared.register(observations)
+    assert first.status is Status.AMBIGUOUS, first.deformation.message
+    assert prepared.register(observations, first).status is Status.AMBIGUOUS
 
 
 def test_a_bad_last_answer_does_not_change_what_is_found(model: Model) -> None:

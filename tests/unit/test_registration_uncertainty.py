@@ -9,6 +9,7 @@ from scipy.stats import chi2
 
 from glisson.core.arrays import FloatArray
 from glisson.core.deformation import Deformation, StageResult
+from glisson.core.errors import BadInput
 from glisson.core.mesh import TetMesh
 from glisson.core.model import Material, Model
 from glisson.core.observations import Observation, Observations
@@ -104,6 +105,12 @@ def test_a_curve_tells_how_it_runs_but_where_it_is_no_better_than_it_was_drawn(m
     ends = spread[[int(np.linalg.norm(mesh.nodes - end, axis=1).argmin()) for end in (line[0], line[-1])]]
     assert np.linalg.norm(ends[:, 1:], axis=2) == pytest.approx(DRAWN_MM, rel=0.05)
     assert np.linalg.norm((ends[1] - ends[0])[1:], axis=1).max() < 0.3
+
+
+def test_what_is_no_covariance_is_refused() -> None:
+    for wrong in (-np.eye(3), np.array([[1.0, 5.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])):
+        with pytest.raises(BadInput, match="covariance"):
+            Observation("surface", "front", np.zeros((1, 3)), 1.0, covariance_mm2=wrong[None])
 
 
 def test_the_models_error_is_as_large_everywhere_and_alike_nearby(mesh: TetMesh) -> None:

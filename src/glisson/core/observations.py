@@ -47,6 +47,10 @@ class Observation:
             object.__setattr__(self, "normals", normals)
         if self.covariance_mm2 is not None:
             covariance = frozen_floats(self.covariance_mm2, (len(points), 3, 3), "point covariance")
+            if not _is_covariance(covariance):
+                raise BadInput(
+                    f"A covariance of observation {self.name!r} is not symmetric, or negative along an axis."
+                )
             object.__setattr__(self, "covariance_mm2", covariance)
 
 
@@ -65,3 +69,10 @@ class Observations:
     def frame(self) -> str:
         """The frame that all items share ("patient" when there are none)."""
         return self.items[0].frame if self.items else "patient"
+
+
+def _is_covariance(matrices: FloatArray) -> bool:
+    """Whether all of (n, 3, 3) are symmetric and without a negative eigenvalue, up to rounding."""
+    size = 1e-9 * np.abs(matrices).max(initial=0.0)
+    symmetric = np.abs(matrices - matrices.transpose(0, 2, 1)).max(initial=0.0) <= size
+    return bool(symmetric and np.linalg.eigvalsh(matrices).min(initial=0.0) >= -size)

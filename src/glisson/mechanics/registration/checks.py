@@ -9,7 +9,7 @@ from glisson.core.registered import Registered
 
 _METRES = 0.02
 _MUCH_LARGER = 3.0
-_FAR = 3.0
+_FAR = 1.0
 _FEWEST = 3
 
 

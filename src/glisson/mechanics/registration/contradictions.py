@@ -8,7 +8,7 @@ from scipy.stats import chi2
 
 from glisson.core.arrays import FloatArray
 from glisson.core.errors import StageFailed
-from glisson.core.observations import Observations
+from glisson.core.observations import Observation, Observations
 from glisson.mechanics.registration.drawing import DRAWN_MM
 from glisson.mechanics.registration.rows import Rows
 from glisson.mechanics.registration.seen import Seen
@@ -70,7 +70,7 @@ def contradiction(observations: Observations, off: tuple[str, ...], fits: Callab
     return f"{sentence} Is it of this organ?"
 
 
-def _fits_without(observations: Observations, item: object, fits: Callable[[Observations], bool]) -> bool:
+def _fits_without(observations: Observations, item: Observation, fits: Callable[[Observations], bool]) -> bool:
     rest = Observations(tuple(other for other in observations.items if other is not item))
     try:
         return fits(rest)

@@ -107,5 +107,5 @@ def _jacobian(motion: Motion, state: MotionState, rows: Rows) -> FloatArray:
 
 
 def _length(step: FloatArray) -> float:
-    """How far a step moves the nodes at most, roughly (mm)."""
+    """How large a step is: how far it moves the nodes as one piece (mm), and the largest amount of its modes."""
     return float(np.linalg.norm(step[:6])) + (float(np.abs(step[6:]).max()) if len(step) > 6 else 0.0)

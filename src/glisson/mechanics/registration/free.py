@@ -17,7 +17,7 @@ from glisson.mechanics.registration.seen import Seen
 class FreeParameters(ElasticParameters):
     """Parameters of the free body."""
 
-    modes: int = parameter(60, "how many of the least certain ways to move are told", minimum=6)
+    modes: int = parameter(60, "how many of the least certain ways to move are told", 6, 500)
 
 
 class Free(ElasticTechnique):

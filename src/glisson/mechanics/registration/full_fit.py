@@ -76,8 +76,9 @@ class FullFit:
             answer: FloatArray = self._solved(load.reshape(-1, 3)).ravel()
             return answer
 
-        values, vectors = eigsh(LinearOperator((size, size), matvec=back, dtype=np.float64), k=modes, v0=np.ones(size))
-        spread: FloatArray = (vectors * np.sqrt(np.maximum(values, 0.0))).reshape(-1, 3, modes)
+        count = min(modes, size - 1)
+        values, vectors = eigsh(LinearOperator((size, size), matvec=back, dtype=np.float64), k=count, v0=np.ones(size))
+        spread: FloatArray = (vectors * np.sqrt(np.maximum(values, 0.0))).reshape(-1, 3, count)
         return spread[: self._count]
 
     def close(self) -> None:

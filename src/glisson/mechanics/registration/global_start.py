@@ -17,6 +17,9 @@ from glisson.geometry.spreading import evenly_spread
 from glisson.mechanics.registration.places import Places
 
 _POINTS = 60
+_WHOLE = 10
+"""With so many points, a part counts as much as any other; a single touch does not."""
+
 _PLACES = 24
 _ROUNDS = ((1, 40.0, 400), (3, 30.0, 60), (20, 15.0, 20), (20, 6.0, 8))
 """Iterations, the scale in mm beyond which points count little (Geman and McClure), how many starts go on."""
@@ -75,7 +78,7 @@ def _part(item: Observation, places: Places) -> _Part:
     else:
         corners = nodes[places.surface(item.name)]
         model = np.concatenate([corners.mean(axis=1), corners.reshape(-1, 3)])
-    return _Part(seen, KDTree(np.unique(model, axis=0)), 1.0 / len(seen))
+    return _Part(seen, KDTree(np.unique(model, axis=0)), 1.0 / max(len(seen), _WHOLE))
 
 
 def _starts(parts: list[_Part]) -> tuple[FloatArray, FloatArray]:

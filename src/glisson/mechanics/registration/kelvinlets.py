@@ -19,8 +19,8 @@ from glisson.mechanics.registration.elastic_technique import ModalTechnique
 class KelvinletsParameters(ElasticParameters):
     """Parameters of the Kelvinlets."""
 
-    centres: int = parameter(45, "number of places on the surface at which forces act", minimum=3)
-    radius_mm: float = parameter(30.0, "how blunt the forces are, mm", minimum=1.0)
+    centres: int = parameter(45, "number of places on the surface at which forces act", 3, 1000)
+    radius_mm: float = parameter(30.0, "how blunt the forces are, mm", 1.0, 200.0)
 
 
 class Kelvinlets(ModalTechnique):

@@ -14,7 +14,7 @@ from glisson.mechanics.registration.elastic_technique import ModalTechnique
 class LinearBasisParameters(ElasticParameters):
     """Parameters of the linear basis."""
 
-    controls: int = parameter(45, "number of points of the surface that move", minimum=3)
+    controls: int = parameter(45, "number of points of the surface that move", 3, 1000)
 
 
 class LinearBasis(ModalTechnique):

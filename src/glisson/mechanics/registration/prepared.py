@@ -11,6 +11,7 @@ from glisson.core.model import Model
 from glisson.core.observations import Observations
 from glisson.core.protocols import Progress, silent
 from glisson.core.registered import Registered
+from glisson.core.status import Status
 from glisson.mechanics.registration.checks import check_last, check_observations
 from glisson.mechanics.registration.contradictions import contradiction, misfits
 from glisson.mechanics.registration.fitting import fit
@@ -68,7 +69,9 @@ class Prepared:
         if last is not None:
             check_last(self._model, observations, last)
         seen = Seen(self._places, observations, self._error)
-        near = None if last is None else self._near(seen, last.positions_mm, progress)
+        # What was as well elsewhere is not settled by going on from it.
+        settled = last is not None and last.status is not Status.AMBIGUOUS
+        near = self._near(seen, last.positions_mm, progress) if last is not None and settled else None
         found, ambiguous = self._anywhere(seen, observations, progress) if near is None else (near, None)
         off = misfits(seen, found.rows, found.shifts_mm)
         doubt = contradiction(observations, off, self._fits) or ambiguous

@@ -6,7 +6,9 @@ from glisson.core.arrays import FloatArray, IntArray
 from glisson.mechanics.registration.floating import FloatingBody
 from glisson.mechanics.registration.motion import BasisMotion, MotionState
 
-_STEP_MM = 0.2
+_STEP = 0.02
+"""Amount of a mode at which curvature is taken by differences."""
+
 _ITERATIONS = 3
 
 
@@ -66,8 +68,8 @@ def second_derivatives(body: FloatingBody, basis: FloatArray) -> FloatArray:
     rest = elasticity.mesh.nodes
 
     def curvature(direction: FloatArray) -> FloatArray:
-        forward, back = (elasticity.forces(rest + side * direction) for side in (_STEP_MM, -_STEP_MM))
-        curved: FloatArray = (forward + back) / _STEP_MM**2
+        forward, back = (elasticity.forces(rest + side * direction) for side in (_STEP, -_STEP))
+        curved: FloatArray = (forward + back) / _STEP**2
         return curved
 
     own = [curvature(basis[:, :, i]) for i in range(count)]

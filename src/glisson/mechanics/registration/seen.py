@@ -111,7 +111,7 @@ class SurfaceMatch:
         corners = positions[nodes]
         touching = np.flatnonzero(nearest.distance_mm < _TOUCHING_MM)
         arms[touching] = _normals(corners[touching])
-        pulls = _along(_unit(arms), nearest.distance_mm, self._errors, nodes, nearest.barycentric, first, True)
+        pulls = _along(_unit(arms), nearest.distance_mm, self._errors, nodes, nearest.barycentric, first)
         return joined([pulls, *self._held(pulls, corners, nearest.barycentric)])
 
     def _held(self, pulls: Rows, corners: FloatArray, barycentric: FloatArray) -> list[Rows]:
@@ -120,9 +120,9 @@ class SurfaceMatch:
         With them the matrix of a Gauss–Newton step has the true curvature of the squared distance.
         """
         inner = (barycentric > _ON_EDGE).sum(axis=1)
-        longest = np.argsort(barycentric, axis=1)
+        nearest = np.argsort(barycentric, axis=1)
         rows = np.arange(len(corners))
-        edge = corners[rows, longest[:, 2]] - corners[rows, longest[:, 1]]
+        edge = corners[rows, nearest[:, 2]] - corners[rows, nearest[:, 1]]
         across_edge = np.cross(edge, pulls.directions)
         found = []
         for chosen, axes in ((inner == 2, (across_edge,)), (inner == 1, _across(pulls.directions))):
@@ -175,7 +175,7 @@ class CurveMatch:
         return np.concatenate([nodes, np.full((len(nodes), 1), first_shift + self._number)], axis=1)
 
     def rows(self, positions: FloatArray, shifts_mm: FloatArray, first: int) -> Rows:
-        """See `Match`: two rows for each, across the curve; beyond its ends the nearest end."""
+        """See `Match`: two rows for each, across the curve, which goes on straight beyond its ends."""
         places = self._curve.points.at(positions) + shifts_mm[self._number]
         begin, end = (places[self._curve.segments[:, side]] for side in (0, 1))
         along = end - begin
@@ -197,7 +197,7 @@ class CurveMatch:
         arms = self._points - begin[nearest] - share[:, None] * along[nearest]
         first_across, second_across = _across(along[nearest])
         parts = [
-            _along(axis, np.einsum("pi,pi->p", arms, axis), self._errors, nodes, weights, first, True)
+            _along(axis, np.einsum("pi,pi->p", arms, axis), self._errors, nodes, weights, first)
             for axis in (first_across, second_across)
         ]
         rows = joined(parts)
@@ -205,12 +205,11 @@ class CurveMatch:
 
 
 def _along(
-    directions: FloatArray, gaps: FloatArray, errors: PointErrors, nodes: IntArray, weights: FloatArray, first: int,
-    robust: bool,
-) -> Rows:  # fmt: skip
-    """One row for each point, along its direction."""
+    directions: FloatArray, gaps: FloatArray, errors: PointErrors, nodes: IntArray, weights: FloatArray, first: int
+) -> Rows:
+    """One row for each point, along its direction; it may be an outlier."""
     sigma = np.sqrt(np.einsum("pi,pij,pj->p", directions, errors.covariance_mm2, directions))
-    numbers, may_lie = first + np.arange(len(gaps)), np.full(len(gaps), robust)
+    numbers, may_lie = first + np.arange(len(gaps)), np.ones(len(gaps), dtype=np.bool_)
     return Rows(nodes, weights, directions, gaps, sigma, numbers, errors.worth, may_lie, np.full(len(gaps), -1))
 
 

@@ -29,9 +29,9 @@ _USUAL_SHARE = 0.5
 class TractionsParameters:
     """Parameters of the organ under tractions."""
 
-    motion_mm: float = parameter(9.0, "how far tissue is typically moved by what deforms the organ, mm", minimum=1e-3)
-    patch_mm: float = parameter(35.0, "over which length forces act alike, mm", minimum=1e-3)
-    fields: int = parameter(80, "how many ways to spread forces over their place", minimum=1)
+    motion_mm: float = parameter(9.0, "how far tissue is typically moved by what deforms the organ, mm", 1e-3, 100.0)
+    patch_mm: float = parameter(35.0, "over which length forces act alike, mm", 5.0, 100.0)
+    fields: int = parameter(80, "how many ways to spread forces over their place", 10, 500)
     model_error_mm: float = parameter(0.7, ERROR_HELP, minimum=1e-3)
     model_error_length_mm: float = parameter(12.0, LENGTH_HELP, minimum=1e-3)
 

@@ -41,7 +41,7 @@ def score_starts(inputs: Mapping[str, Any], folder: Path) -> Outcome:
 
 
 def thrown(found: Registered, random: np.random.Generator) -> Registered:
-    """The answer turned about its middle and shifted, by up to 30 degrees and 30 mm."""
+    """The answer turned about its middle by 10 to 30 degrees, and shifted by 10 to 30 mm."""
     middle, ways = found.positions_mm.mean(axis=0), random.normal(size=(2, 3))
     axis, way = ways / np.linalg.norm(ways, axis=1, keepdims=True)
     turn = Rotation.from_rotvec(np.radians(random.uniform(*_TURNS_DEG)) * axis)
