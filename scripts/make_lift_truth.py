@@ -14,7 +14,7 @@ work folder.
 Debian's `ccx` 2.20 (SPOOLES, one thread) takes 6 to 8 s an iteration with edges of 18 mm, an hour or so a truth, and
 increments of `LiftSettings`' own sizes. The unseen truths, with edges of 24 mm (700: 22 mm), are of the same source
 built with MKL's PARDISO, the ordering kept as long as the matrix has the same structure: 150 to 230 iterations of some
-1.3 s, 4 to 8 minutes a truth. Two places of CalculiX were repaired for them, and the large increments asked for here
+1.3 s, 4 to 8 minutes a truth. Two places of CalculiX were repaired for them, and the larger increments of `--repaired`
 need that. `plane_eq.f` carries the state of contact over to the next increment's points and divides by zero where
 three of the old ones lie in a line, so that the matrix is singular; it takes the nearest one's state. `nonlingeo.c`
 begins a step with an iteration that is linear (`ilin`), also in contact, which throws a lifted organ off; with contact
@@ -25,6 +25,7 @@ Debian's `ccx` to 1e-5 mm.
 import argparse
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -80,18 +81,11 @@ def young_moduli(mesh: TetMesh, anatomy: Anatomy, modulus_kpa: float) -> FloatAr
     return uneven_moduli(mesh, modulus_kpa, [contains(tumour.solid) for tumour in anatomy.interior.tumours])
 
 
-def settings_of(truth: LiftTruth) -> LiftSettings:
+def settings_of(truth: LiftTruth, repaired: bool) -> LiftSettings:
     """Contact some 8 times as stiff per mm as the tissue, and the steps of the manoeuvre."""
     normal = 60.0 / 7.0 * truth.young_modulus_kpa
-    return LiftSettings(
-        truth.angle_deg,
-        truth.friction,
-        step_deg=8.0,
-        largest_deg=4.0,
-        settling_part=1.0,
-        normal_kpa_mm=normal,
-        tangent_kpa_mm=0.2 * normal,
-    )
+    settings = LiftSettings(truth.angle_deg, truth.friction, normal_kpa_mm=normal, tangent_kpa_mm=0.2 * normal)
+    return replace(settings, step_deg=8.0, largest_deg=4.0, settling_part=1.0) if repaired else settings
 
 
 def weights_of(mesh: TetMesh) -> FloatArray:
@@ -179,6 +173,7 @@ def main() -> int:
     parser.add_argument("--work", type=Path, required=True, help="folder for the mesh, the deck and the results")
     parser.add_argument("--edge-mm", type=float, default=18.0, help="edge length aimed at (default 18)")
     parser.add_argument("--threads", type=int, default=1, help="threads for CalculiX (default 1)")
+    parser.add_argument("--repaired", action="store_true", help="larger increments, for a CalculiX repaired as above")
     parser.add_argument("--export-only", action="store_true", help="take the results that are there")
     options = parser.parse_args()
     work: Path = options.work
@@ -193,7 +188,7 @@ def main() -> int:
     organ = LiftOrgan(
         mesh, young_moduli(mesh, anatomy, truth.young_modulus_kpa), truth.poisson_ratio, DENSITY_KG_M3, held
     )
-    settings = settings_of(truth)
+    settings = settings_of(truth, options.repaired)
     deck = work / ("again.inp" if options.export_only else "lift.inp")
     steps = write_lift_deck(deck, organ, lever, settings)
     say(f"{len(mesh.nodes)} nodes, {len(mesh.tetrahedra)} C3D10, {len(held)} corners held: {deck}")

@@ -135,7 +135,6 @@ def test_pulls_by_patterns_move_what_their_forces_move_one_by_one(reduced: Reduc
     pulled = Pulled.of(local, shares @ random.normal(size=(2, 3)))
     again = shares @ random.normal(size=(2, 3))
     same = pulled.by(again)
-    assert same is not None
     alone = np.einsum("kin...,ki->n...", local.fields, again @ turn) @ turn.T
     assert np.abs(same.displacement(turn) - alone).max() < 1e-5 * np.abs(alone).max()
     assert pulled.by(random.normal(size=again.shape)) is None

@@ -6,6 +6,7 @@ residual flexibility, as in component mode synthesis (Craig and Chang 1977). It 
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -47,7 +48,7 @@ class LocalCompliance:
         result: FloatArray = found.reshape(-1, 3).astype(np.float64) @ turn.T
         return result
 
-    @property
+    @cached_property
     def mean_mm_per_mn(self) -> float:
         """By how much a node gives way to a force on it."""
         return float(np.einsum("kiki->", self.compliance)) / (3.0 * len(self.nodes))

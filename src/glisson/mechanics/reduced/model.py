@@ -88,10 +88,6 @@ class ReducedModel:
         # Single precision is read twice as fast, and good to a micrometre.
         return np.ascontiguousarray(self.basis[:, :, : self.size].reshape(-1, self.size), dtype=np.float32)
 
-    @cached_property
-    def _giving_way(self) -> float:
-        return self.local.mean_mm_per_mn
-
     @property
     def size(self) -> int:
         """The number of modal unknowns r."""
@@ -147,7 +143,7 @@ class ReducedModel:
         )
         raw = modal + _PULLED * largest(answer.pulled) + _PUSHED * pushed
         if answer.contact is not None:
-            raw += self._giving_way * answer.contact.unknown_force(answer.unknowns)
+            raw += self.local.mean_mm_per_mn * answer.contact.unknown_force(answer.unknowns)
         return raw
 
     def positions(self, answer: Answer) -> FloatArray:

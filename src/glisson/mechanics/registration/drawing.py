@@ -11,12 +11,13 @@ from glisson.mechanics.registration.rows import Rows
 DRAWN_MM = 1.5
 """Standard deviation of a curve's shift along each axis."""
 
-_PRECISION = 1.0 / DRAWN_MM**2
+SHIFT_PRECISION = 1.0 / DRAWN_MM**2
+"""Of each coordinate of a shift, per mm²."""
 
 
 def shift_cost(shifts_mm: FloatArray) -> float:
     """What shifts (q, 3) cost."""
-    return 0.5 * _PRECISION * float((shifts_mm**2).sum())
+    return 0.5 * SHIFT_PRECISION * float((shifts_mm**2).sum())
 
 
 def with_shifts(jacobian: FloatArray, rows: Rows, count: int) -> FloatArray:
@@ -33,8 +34,8 @@ def with_shift_prior(pull: FloatArray, prior: FloatArray, shifts_mm: FloatArray)
     size = len(pull) + shifts_mm.size
     hessian = np.zeros((size, size))
     hessian[: len(pull), : len(pull)] = prior
-    hessian[len(pull) :, len(pull) :] = _PRECISION * np.eye(shifts_mm.size)
-    return np.concatenate([pull, _PRECISION * shifts_mm.ravel()]), hessian
+    hessian[len(pull) :, len(pull) :] = SHIFT_PRECISION * np.eye(shifts_mm.size)
+    return np.concatenate([pull, SHIFT_PRECISION * shifts_mm.ravel()]), hessian
 
 
 def marginal(hessian: FloatArray, size: int) -> FloatArray:

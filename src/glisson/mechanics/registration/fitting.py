@@ -18,7 +18,7 @@ from glisson.mechanics.registration.seen import Seen
 
 _ITERATIONS = 200
 _AT_REST = 1e-4
-_LONGEST_MM = 15.0
+_LONGEST = 15.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ def _descend(motion: Motion, seen: Seen, begun: Fit, cut: FloatArray) -> Fit:
         except LinAlgError:
             damping.raised()
             continue
-        share = min(1.0, _LONGEST_MM / max(_length(step[: motion.size]), 1e-12))
+        share = min(1.0, _LONGEST / max(_length(step[: motion.size]), 1e-12))
         there = _stepped(motion, seen, here, share * step, cut)
         gained = here.cost - there.cost
         if gained > 0.0:

@@ -13,7 +13,7 @@ from glisson.core.status import Status
 from glisson.mechanics.elasticity import Elasticity
 from glisson.mechanics.linear_solvers import make_direct_solver
 from glisson.mechanics.pattern import FreeSystem, Stiffness, block_pattern
-from glisson.mechanics.registration.drawing import DRAWN_MM, shift_cost
+from glisson.mechanics.registration.drawing import SHIFT_PRECISION, shift_cost
 from glisson.mechanics.registration.outliers import cuts, judged, narrowing
 from glisson.mechanics.registration.rest import Rest
 from glisson.mechanics.registration.rows import Rows
@@ -116,7 +116,7 @@ class FullFit:
         rows = here.rows
         pull = (here.weights * rows.residuals / rows.sigma_mm)[:, None] * rows.directions
         forces = self._elasticity.forces(here.positions) / self._energy_uj
-        gradient = np.concatenate([forces, here.shifts_mm / DRAWN_MM**2])
+        gradient = np.concatenate([forces, SHIFT_PRECISION * here.shifts_mm])
         nodes, weights = self._with_shifts(rows)
         np.add.at(gradient, nodes, -weights[:, :, None] * pull[:, None])
         return gradient
@@ -138,7 +138,7 @@ class FullFit:
         nodes, weights = self._with_shifts(rows)
         self._pattern.add_groups(nodes, np.einsum("ra,rb,ri,rj->rabij", weights, weights, scaled, scaled), blocks)
         held = np.full(self._count + len(here.shifts_mm), _HOLDING)
-        held[self._count :] = 1.0 / DRAWN_MM**2
+        held[self._count :] = SHIFT_PRECISION
         self._pattern.add_diagonal(damping * self._pattern.diagonal(blocks).mean(axis=1) + held, blocks)
         return Stiffness(self._pattern, self._system, blocks, np.concatenate([here.positions, here.shifts_mm]))
 

@@ -12,6 +12,7 @@ from glisson.core.observations import Observation, Observations
 from glisson.core.protocols import PreparedRegistration
 from glisson.core.registered import Registered
 from glisson.core.registry import make_technique
+from glisson.framework.registering import DEFAULT
 from glisson.geometry.distance import SurfaceTree
 from glisson.geometry.location import PointLocator
 from glisson.mechanics.registration.next_touch import Touches, touches, viewer
@@ -23,7 +24,6 @@ from glisson.studies.registration.scoring import SCORE
 from glisson.studies.registration.solving_model import read_model
 from glisson.studies.registration.truths import build_case, carry_of
 
-TECHNIQUE = "tractions"
 LIVER = Task(f"{__name__}:score_liver", (*SCORE.packages, __name__))
 
 PROPOSED, RANDOM = "proposed", "random"
@@ -36,7 +36,7 @@ _STREAM = 7
 def score_liver(inputs: Mapping[str, Any], folder: Path) -> Outcome:
     """`rows`, one for each case of a liver; those whose numbers are in `touched` are touched once more, too."""
     model = read_model(folder, inputs["model"])
-    prepared = make_technique("registration", TECHNIQUE, {}, TECHNIQUE).prepare(model)
+    prepared = make_technique("registration", DEFAULT, {}, DEFAULT).prepare(model)
     locator = PointLocator(model.mesh)
     rows = []
     for values in inputs["cases"]:
